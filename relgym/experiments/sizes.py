@@ -26,7 +26,16 @@ from relgym.scene.objects import Float2D, ObjectType, Scene, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box
 
-__all__ = ["WORLDS", "SizeCost", "cost", "main", "many_bodies", "many_kinds", "many_properties"]
+__all__ = [
+    "WORLDS",
+    "SizeCost",
+    "cost",
+    "main",
+    "many_bodies",
+    "many_constants",
+    "many_kinds",
+    "many_properties",
+]
 
 _SHELL: Final = 5  # the ball, and floor, ceiling and walls
 _STEPS: Final = 300
@@ -55,7 +64,12 @@ def many_kinds(kinds: int, steps: int = _STEPS) -> Iterator[Transition]:
         yield Transition(Scene(schema, layout, before), Scene(schema, layout, after))
 
 
-def many_properties(properties: int, steps: int = _STEPS) -> Iterator[Transition]:
+def many_constants(properties: int, steps: int = _STEPS) -> Iterator[Transition]:
+    """An object with so many properties: sixteen decay, sixteen are noise, the others never change."""
+    return many_properties(properties, steps, every=properties // 16)
+
+
+def many_properties(properties: int, steps: int = _STEPS, *, every: int = 8) -> Iterator[Transition]:
     """An object with so many properties: one in eight decays, one in eight is noise, the others never change."""
     wide = ObjectType("wide", tuple(f"p{k}" for k in range(properties)))
     schema = SceneSchema((wide,), (("wide", "wide"),))
@@ -63,8 +77,8 @@ def many_properties(properties: int, steps: int = _STEPS) -> Iterator[Transition
     now = rng.normal(size=properties)
     for _ in range(steps):
         then: Float2D = now.copy()
-        then[::8] *= 0.9
-        then[1::8] = rng.normal(size=len(then[1::8]))
+        then[::every] *= 0.9
+        then[1::every] = rng.normal(size=len(then[1::every]))
         yield Transition(Scene(schema, layout, now), Scene(schema, layout, then))
         now = then
 
@@ -73,6 +87,7 @@ WORLDS: Final[dict[str, tuple[Callable[[int], Iterator[Transition]], int]]] = {
     **{f"bodies-{count}": (many_bodies, count) for count in (12, 60, 200, 1000)},
     **{f"kinds-{count}": (many_kinds, count) for count in (20, 200)},
     **{f"properties-{count}": (many_properties, count) for count in (100, 400, 2800)},
+    **{f"constants-{count}": (many_constants, count) for count in (400, 2800)},
 }
 """What makes the transitions of each world, and of which size."""
 

@@ -207,7 +207,15 @@ class EncounterStore:
             tuple(self.kinds),
             book.tolerance,
             np.stack([a[-1] * arms[0] + b[-1] * arms[1] for a, b in (now, free, after)]),
+            part,
+            self._store.arrived[part],
+            self._store.cells[part] % 2 == 0,
         )
+
+    def drop(self, places: NDArray[np.intp]) -> None:
+        """Keep some contacts no longer (`Encounters.places`)."""
+        self._look_at_waiting()
+        self._store.drop(places)
 
     def shares(self, book: LawBook) -> dict[Kind, Share]:
         """How the two bodies of each kind of moving pair share an impulse, as far as that is known."""

@@ -24,7 +24,7 @@ from relgym.laws.encounters import EncounterStore
 from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger, doubtful
-from relgym.laws.pair import PairFit, fit_pair
+from relgym.laws.pair import PairFit, fit_pair, outdated
 from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
@@ -407,6 +407,11 @@ class LawLearner:
         if encounters is None or len(encounters) < FEWEST_CONTACTS:
             return None
         found = fit_pair(encounters, rng=self._rng)
+        if (gone := outdated(encounters, found, rng=self._rng)).any() and encounters.places is not None:
+            store.drop(encounters.places[gone])
+            rest = store.encounters(book)
+            assert rest is not None, "what came later stays"
+            found = fit_pair(rest, rng=self._rng)
         book.pair = found.law
         book.shares = store.shares(book)
         return found

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import TIE_BITS, TOLD
+from relgym.config.constants import EVIDENCE, TIE_BITS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.kinds import KindsFit, fit_apart, fit_together
 from relgym.laws.pieces import AxisExamples
 from relgym.laws.records import ONE, Kind, PairLaw
+from relgym.numeric.changes import changed_at
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 
-__all__ = ["Encounters", "PairFit", "fit_pair"]
+__all__ = ["Encounters", "PairFit", "explained", "fit_pair", "outdated"]
 
 SPLIT = 2
 """In so many of the best frames materials are told apart, should one law not be enough for all."""
@@ -41,6 +42,9 @@ class Encounters:
     rims
         How fast the surfaces of A and B move where they touch, against their centres and summed up, along the turned
         normal: before, without this contact, and after it; shape ``(3, n)``. All 0 where nothing spins.
+    places, arrived, foreseen
+        Where each contact is kept, how many had come when it came, itself counted, and whether it came as the laws of
+        that time said; shape ``(n,)``.
     """
 
     now: FloatArray
@@ -51,9 +55,32 @@ class Encounters:
     names: tuple[Kind, ...]
     tolerance: float
     rims: FloatArray | None = None
+    places: NDArray[np.intp] | None = None
+    arrived: NDArray[np.int64] | None = None
+    foreseen: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.kinds)
+
+    def rows(self, chosen: NDArray[np.intp]) -> Encounters:
+        """Some of the contacts."""
+        normal, centres, angles = (
+            np.ascontiguousarray(each[:, chosen])
+            for each in (self.bearings.normal, self.bearings.centres, self.bearings.angles)
+        )
+        return Encounters(
+            self.now[:, chosen],
+            self.free[:, chosen],
+            self.after[:, chosen],
+            Bearings(normal, centres, angles),
+            self.kinds[chosen],
+            self.names,
+            self.tolerance,
+            None if self.rims is None else self.rims[:, chosen],
+            None if self.places is None else self.places[chosen],
+            None if self.arrived is None else self.arrived[chosen],
+            None if self.foreseen is None else self.foreseen[chosen],
+        )
 
     def at_points(self) -> Encounters | None:
         """The contacts with the velocities of the points that touch; None where no spin is known to differ."""
@@ -100,6 +127,56 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
             best = found
     assert best is not None, "without a limit every frame gives a law"
     return best
+
+
+def outdated(encounters: Encounters, found: PairFit, *, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Contacts of a world that has changed: a law of their own, and one of what came later, say all in fewer bits.
+
+    What comes later may also be what nobody did before: then one law says both as briefly, so that two must be shorter
+    by `EVIDENCE`. What the later law says of earlier contacts, too, isn't outdated.
+
+    Parameters
+    ----------
+    encounters
+        The contacts, with when they came, and whether as the laws of that time said.
+    found
+        The law of them all.
+    rng
+        Source of random samples.
+
+    Returns
+    -------
+    Shape ``(n,)``.
+    """
+    gone = np.zeros(len(encounters), dtype=np.bool_)
+    if encounters.arrived is None or encounters.foreseen is None:
+        return gone
+    order = np.argsort(encounters.arrived)
+    began = changed_at(~encounters.foreseen[order])
+    if began is None:
+        return gone
+    early, late = order[:began], order[began:]
+    then, now = (fit_pair(encounters.rows(part), rng=rng).law for part in (early, late))
+    if then.bits + now.bits + np.log2(len(encounters)) + EVIDENCE < found.law.bits:
+        gone[early] = ~explained(now, encounters.rows(early))
+    return gone
+
+
+def explained(law: PairLaw, encounters: Encounters) -> NDArray[np.bool_]:
+    """Which contacts came as a law says, whether it is doubted of their kind or not; shape ``(n,)``."""
+    seen = encounters.at_points() if law.frame == POINT else encounters
+    if seen is None:
+        return np.zeros(len(encounters), dtype=np.bool_)
+    axes, letters = axes_of(law.frame, seen.bearings, seen.free), axis_names(law.frame, len(seen.now))
+    found = _inside(axes, seen)
+    for k in range(len(axes)):
+        examples = _axis_examples(k, letters, axes, seen)
+        columns = {name: examples.x[:, j] for j, name in enumerate(examples.names)}
+        for number in np.unique(seen.kinds).tolist():
+            own = law.law_of(k, seen.names[number])
+            says = np.full(len(seen), np.nan) if own is None else own.values(columns, examples.y)
+            found &= (seen.kinds != number) | (np.abs(says - examples.y) <= examples.tolerance)
+    return found
 
 
 def _bits(draft: _Draft) -> float:

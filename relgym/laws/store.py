@@ -34,6 +34,7 @@ class Store:
         self.seen = 0
         self._rows = np.zeros((FIRST_ROOM, width))
         self._cells = np.zeros(FIRST_ROOM, dtype=np.int64)
+        self._arrived = np.zeros(FIRST_ROOM, dtype=np.int64)
         self._size = 0
         self._counts: dict[int, int] | None = None  # worked out when it is needed
         self._rng = np.random.default_rng([seed, 2])
@@ -42,6 +43,16 @@ class Store:
     def rows(self) -> NDArray[np.float64]:
         """The rows kept, shape ``(n, width)``."""
         return self._rows[: self._size]
+
+    @property
+    def cells(self) -> NDArray[np.int64]:
+        """The cell of each, shape ``(n,)``."""
+        return self._cells[: self._size]
+
+    @property
+    def arrived(self) -> NDArray[np.int64]:
+        """How many rows had come when each came, itself counted, shape ``(n,)``."""
+        return self._arrived[: self._size]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -60,6 +71,7 @@ class Store:
             return self._make_room(cell)
         if self._size == len(self._rows):
             self._rows, self._cells = grown(self._rows, self.limit), grown(self._cells, self.limit)
+            self._arrived = grown(self._arrived, self.limit)
         return self._size
 
     def put(self, place: int, row: NDArray[np.float64], *, cell: int) -> None:
@@ -70,7 +82,15 @@ class Store:
         else:
             counts[int(self._cells[place])] -= 1
         counts[cell] = counts.get(cell, 0) + 1
-        self._rows[place], self._cells[place] = row, cell
+        self._rows[place], self._cells[place], self._arrived[place] = row, cell, self.seen
+
+    def drop(self, places: NDArray[np.intp]) -> None:
+        """Keep some rows no longer."""
+        kept = np.setdiff1d(np.arange(self._size), places)
+        end = len(kept)
+        self._rows[:end], self._cells[:end] = self._rows[kept], self._cells[kept]
+        self._arrived[:end] = self._arrived[kept]
+        self._size, self._counts = end, None
 
     def _cell_counts(self) -> dict[int, int]:
         """Number of rows kept in each cell."""
@@ -92,8 +112,8 @@ class Store:
         return {"seen": self.seen, "random": self._rng.bit_generator.state}
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """The rows and their cells."""
-        return {"rows": self.rows, "cells": self._cells[: self._size]}
+        """The rows, their cells, and when they came."""
+        return {"rows": self.rows, "cells": self.cells, "arrived": self.arrived}
 
     def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote."""
@@ -102,3 +122,6 @@ class Store:
         self._rows = np.array(arrays["rows"], dtype=np.float64)
         self._cells = np.array(arrays["cells"], dtype=np.int64)
         self._size, self._counts = len(self._rows), None
+        # Earlier files don't say when rows came; until a store was full they lay in that order.
+        came = arrays["arrived"] if "arrived" in arrays else np.arange(1, self._size + 1)
+        self._arrived = np.array(came, dtype=np.int64)

@@ -18,10 +18,11 @@ from relgym.envs.arguments import checked_count, checked_least
 from relgym.envs.dreams.rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
+from relgym.numeric.changes import changed_at
 from relgym.planning.doubts import DoubtedTask, HopefulTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import changed_at, learned_again, length, missed, mixed, right
+from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator

@@ -1,19 +1,18 @@
-"""Learning again, in other orders, from what was met in the order of life; and from when on a model was wrong."""
+"""Learning again, in other orders, from what was met in the order of life; and what a model misses of it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import entr
 
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["changed_at", "learned_again", "length", "missed", "mixed", "right"]
+__all__ = ["learned_again", "length", "missed", "mixed", "right"]
 
 _LITERALS: Final = 5
 """So many literals of clauses take as many bits as a number: some four each (which relation, of which objects), and a
@@ -115,47 +114,6 @@ def length(model: WorldModel) -> float:
         for pair in known.classifier.classifiers:
             found += sum(len(clause) for clause in pair.definition.clauses) / _LITERALS
     return found
-
-
-def changed_at(wrong: Sequence[bool]) -> int | None:
-    """From which step on a model was wrong more often than before, if it was.
-
-    Two shares of wrong steps, one up to some step and one from there on, are stated instead of one if that takes fewer
-    bits, those included that state the second share and where it begins (Rissanen 1983): ``1.5 * log2(n)``.
-
-    Parameters
-    ----------
-    wrong
-        Whether the model was wrong, in n steps, the latest one last.
-
-    Returns
-    -------
-    Number of the first step of the second part, from 1 to n - 1; None if one share says it as well.
-
-    Examples
-    --------
-    >>> changed_at([False] * 40 + [True] * 10)
-    40
-    >>> changed_at([False, True] * 25) is None
-    True
-    """
-    count = len(wrong)
-    if count < 2:
-        return None
-    misses = np.cumsum(wrong)
-    before = np.arange(1, count)
-    after = count - before
-    early, late = misses[:-1], misses[-1] - misses[:-1]
-    saved = _bits(misses[-1], count) - _bits(early, before) - _bits(late, after)
-    saved[early * after >= late * before] = -np.inf
-    best = int(np.argmax(saved))
-    return best + 1 if saved[best] > 1.5 * np.log2(count) else None
-
-
-def _bits(misses: Any, of: Any) -> Any:
-    """What it takes to state which of so many steps were wrong, by their share."""
-    share = misses / of
-    return of * (entr(share) + entr(1.0 - share)) / np.log(2.0)
 
 
 def mixed(episodes: NDArray[np.intp], rng: np.random.Generator) -> list[int]:

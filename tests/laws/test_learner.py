@@ -93,6 +93,36 @@ def _of_one_kind(experiment: int, kind: str, count: int = 12) -> LawLearner:
     return learner
 
 
+def test_where_friction_has_changed_only_what_came_since_counts() -> None:
+    learner = LawLearner(BallBoxRampEnv().schema, BallBoxRampEnv().schema.targets or (), seed=0)
+    tangents, seen = [], []
+    for friction in (0.1, 0.2):
+        for stream in played(BallBoxRampEnv(friction=friction), 10, seed=int(10 * friction)):
+            learn(learner, stream)
+        tangents.append(formulas(learner.book)[1])
+        seen.append(learner.contacts_seen)
+    assert tangents == [["max(0, u_t - 0.1 J_n)"], ["max(0, u_t - 0.2 J_n)"]]
+    assert learner.book.pair is not None and learner.book.pair.unexplained == 0
+    assert errors(learner.book, played(BallBoxRampEnv(friction=0.2), 8, seed=7)) == (0, 0, 1600)
+    assert learner.book.pair.examples < seen[1]  # those of before are forgotten
+
+
+def test_what_is_met_late_is_no_change_of_the_world() -> None:
+    world = BallBoxRampEnv(friction={"floor": 0.1, "box": 0.4, "ramp": 0.3, "wall": 0.2})
+    learner = LawLearner(world.schema, world.schema.targets or (), seed=0)
+    streams = played(world, 24, seed=3)
+    others = touching_only("floor", streams[0])
+    ball = streams[0].layout.bodies.index(streams[0].layout.index("ball"))
+    for stream in streams[:8]:
+        learn(learner, stream, lambda touch: not touch[ball, others].any())
+    for stream in streams[8:]:
+        learn(learner, stream)
+    assert learner.book.pair is not None
+    assert len(learner._store) == learner.contacts_seen  # all are kept
+    told = " ".join(formulas(learner.book)[1])
+    assert "u_t - 0.1 J_n" in told and "u_t - 0.3 J_n" in told
+
+
 def test_the_same_stream_and_seed_give_the_same_laws() -> None:
     one, two = (taught(episodes(2, 3)).to_json(history=True) for _ in range(2))
     assert one == two

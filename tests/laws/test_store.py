@@ -40,3 +40,25 @@ def test_saved_and_restored_it_goes_on_alike() -> None:
         one.add(np.array([2.0, k]), cell=2)
         two.add(np.array([2.0, k]), cell=2)
     assert one.rows.tobytes() == two.rows.tobytes()
+
+
+def test_it_knows_when_each_row_came() -> None:
+    store = filled(1000)
+    assert store.arrived.tolist() == (store.rows[:, 1] + 1).tolist()
+
+
+def test_what_is_dropped_makes_room() -> None:
+    store = filled(40, rare=20)
+    came = store.arrived.copy()
+    store.drop(np.flatnonzero(store.cells == 1))
+    assert store.rows[:, 1].tolist() == list(range(40)) and store.arrived.tolist() == came[20:].tolist()
+    for k in range(60):
+        store.add(np.array([3.0, k]), cell=3)
+    assert (len(store.rows), store.seen) == (100, 120)
+
+
+def test_earlier_files_do_not_say_when_rows_came() -> None:
+    one, two = filled(30), Store(2, 100, seed=9)
+    arrays = {name: array for name, array in one.to_arrays().items() if name != "arrived"}
+    two.restore(one.to_json(), arrays)
+    assert two.arrived.tolist() == one.arrived.tolist()

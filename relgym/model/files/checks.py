@@ -708,6 +708,11 @@ def _stored(arrays: _Arrays, name: str, width: int, limit: int, seen: int, cells
     n = _rows(arrays, f"{name}.rows", "float64", (None, width))
     _require(n <= min(limit, seen), f"{name}.rows", f"expected at most {min(limit, seen)}, got {n:,}")
     _rows(arrays, f"{name}.cells", "int64", (n,))
+    if f"{name}.arrived" in arrays:
+        _rows(arrays, f"{name}.arrived", "int64", (n,))
+        _require(
+            _within(arrays[f"{name}.arrived"], 0, seen + 1), f"{name}.arrived", "expected no more than came"
+        )
     rows, found = arrays[f"{name}.rows"], arrays[f"{name}.cells"]
     _require(_sized(rows), f"{name}.rows", _SIZED)
     _require(_within(found, 0, cells), f"{name}.cells", "expected one of the cells")
@@ -735,6 +740,8 @@ def _check_history(body: Body, parts: Parts, targets: Sequence[Target], arrays: 
     if body.laws is not None:
         stores = ["contacts", *(f"free{k}" for k in range(len(body.laws.laws.learners or ())))]
         expected |= {f"laws.{store}.{name}" for store in stores for name in ("rows", "cells")}
+        came = {f"laws.{store}.arrived" for store in stores}  # which earlier files don't say
+        expected |= came & set(arrays)
     expected |= _check_regression_shapes(body, arrays)
     _require(
         set(arrays) == expected,
