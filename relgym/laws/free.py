@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import LEFT_OPEN
+from relgym.config.constants import EVIDENCE, LEFT_OPEN
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
 from relgym.laws.regions import find_laws, find_regions
 from relgym.laws.store import Store
+from relgym.numeric.changes import changed_at
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise
 from relgym.scene.geometry.vectors import FloatArray
@@ -115,12 +116,40 @@ class FreeLearner:
 
     def fit(self, tolerance: float) -> bool:
         """Learn the law anew from the examples kept; whether it changed."""
-        found = self._fitted(tolerance)
+        found = self._fitted(self.store.rows, tolerance)
+        if len(gone := self._outdated(found, tolerance)):
+            self.store.drop(gone)
+            found = self._fitted(self.store.rows, tolerance)
         before, self.law = self.law, found
         return (before and before.says()) != (found and found.says())
 
-    def _fitted(self, tolerance: float) -> FreeLaw | None:
-        rows = self.store.rows
+    def _outdated(self, found: FreeLaw | None, tolerance: float) -> NDArray[np.intp]:
+        """Examples of a world that has changed: a law of theirs, and one of what came later, say all in fewer bits.
+
+        As `relgym.laws.pair.outdated` has it of contacts. What the later law says of earlier ones, too, isn't outdated.
+        Where other laws may hold in other regions, what is met late is another region's.
+        """
+        rows, order = self.store.rows, np.argsort(self.store.arrived)
+        began = changed_at(self.store.cells[order] == 1)
+        if began is None or self.sources.where:
+            return order[:0]
+        early, late = order[:began], order[began:]
+        then, now = (self._fitted(rows[part], tolerance) for part in (early, late))
+        if then is None or now is None:
+            return order[:0]
+        whole = EXCEPTION_BITS * self._d * len(rows) if found is None else found.bits
+        if then.bits + now.bits + np.log2(len(rows)) + EVIDENCE >= whole:
+            return order[:0]
+        return early[~self._explained(now, rows[early], tolerance)]
+
+    def _explained(self, law: FreeLaw, rows: NDArray[np.float64], tolerance: float) -> NDArray[np.bool_]:
+        """Which examples a law explains, all components that it is of."""
+        x, y = rows[:, : -self._d], rows[:, -self._d :]
+        says = free_motion(law, self.sources.names, x.T).T
+        explained = np.asarray((np.abs(says - y[:, : says.shape[1]]) <= tolerance).all(axis=1))
+        return explained
+
+    def _fitted(self, rows: NDArray[np.float64], tolerance: float) -> FreeLaw | None:
         x, y = rows[:, : -self._d], rows[:, -self._d :]
         if len(rows) < FEWEST:
             return None

@@ -67,6 +67,23 @@ def test_an_over_specific_law_is_revised(rng: np.random.Generator) -> None:
     assert formulas(taught(still + moving)) == ["0.5 vx", "0.5 vy + vx"]
 
 
+def test_where_gravity_has_changed_only_what_came_since_counts(rng: np.random.Generator) -> None:
+    falls = [
+        [([x, y, 0.0, 0.0, 0.0], [x, y - g]) for x, y in rng.normal(size=(900, 2))] for g in (0.01, 0.005)
+    ]
+    learner = taught(falls[0] + falls[1][:12])
+    assert formulas(learner) == ["vx", "vy - 0.005"]
+    assert learner.law is not None and learner.law.unexplained == 0 and len(learner.store.rows) == 12
+    assert formulas(taught(falls[0] + falls[1] + falls[0][:12])) == ["vx", "vy - 0.01"]  # and back
+
+
+def test_what_is_done_late_is_no_change_of_the_world(rng: np.random.Generator) -> None:
+    idle = [([x, y, 0.0, 0.0, 0.0], [x, y - 0.01]) for x, y in rng.normal(size=(300, 2))]
+    pushed = [([x, y, 0.0, f, 0.0], [x + 0.1 * f, y - 0.01]) for x, y, f in rng.normal(size=(100, 3))]
+    learner = taught(idle + pushed)
+    assert formulas(learner) == ["vx + 0.1 action.fx", "vy - 0.01"] and len(learner.store.rows) == 400
+
+
 def test_no_law_where_there_is_none(rng: np.random.Generator) -> None:
     rows = [(x.tolist(), [float(np.sin(9 * x[0])), float(x[1] ** 2)]) for x in rng.normal(size=(80, 5))]
     assert taught(rows).law is None
