@@ -50,9 +50,9 @@ those of one kind of contacts (a conveyor among walls), and where an impulse wou
 none was seen to. A law that has no piece for letting go pays extra.
 
 *Revision.* Contacts are kept raw, at most 3,000; what was news when it came stays longest. When a free law turns out
-to have been over-specific, all that rests on it is derived again. Where contacts, or free bodies, came as predicted less
-often from some time on, and two laws, one for what was before and one for what came since, are shorter than one, the
-world has changed: what the later law doesn't say of earlier examples is forgotten.
+to have been over-specific, all that rests on it is derived again. Where contacts, or free bodies, came as predicted
+less often from some time on, and two laws, one for what was before and one for what came since, are shorter than one,
+the world has changed: what the later law doesn't say of earlier examples is forgotten.
 
 *Laws or modes?* The model weighs both by description length, each unexplained number once, and lets laws govern a
 type where they are shorter: laws that leave all bounces open may win, and then say nothing of bounces. Without

@@ -30,7 +30,9 @@ def acting_all(
     done = np.asarray(actions, dtype=np.float64).reshape(len(vectors), -1)
     if schema.action_scale:
         ranges = {p: (k, low, high) for k, (p, low, high) in enumerate(schema.action_scale)}
-        order, low, high = map(list, zip(*(ranges[p] for p in schema.type_of(ACTION).properties), strict=True))
+        order, low, high = map(
+            list, zip(*(ranges[p] for p in schema.type_of(ACTION).properties), strict=True)
+        )
         done = low + (done[:, order] + 1.0) / 2.0 * np.subtract(high, low)
     if done.shape[1] != (known := len(schema.type_of(ACTION).properties)):
         raise ConfigError(
