@@ -130,8 +130,9 @@ class FreeLearner:
         Where other laws may hold in other regions, what is met late is another region's.
         """
         rows, order = self.store.rows, np.argsort(self.store.arrived)
-        began = changed_at(self.store.cells[order] == 1)
-        if began is None or self.sources.where:
+        if self.sources.where or (found is not None and not found.unexplained):
+            return order[:0]
+        if (began := changed_at(self.store.cells[order] == 1)) is None:
             return order[:0]
         early, late = order[:began], order[began:]
         then, now = (self._fitted(rows[part], tolerance) for part in (early, late))

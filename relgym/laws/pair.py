@@ -149,7 +149,7 @@ def outdated(encounters: Encounters, found: PairFit, *, rng: np.random.Generator
     Shape ``(n,)``.
     """
     gone = np.zeros(len(encounters), dtype=np.bool_)
-    if encounters.arrived is None or encounters.foreseen is None:
+    if encounters.arrived is None or encounters.foreseen is None or found.explained.all():
         return gone
     order = np.argsort(encounters.arrived)
     began = changed_at(~encounters.foreseen[order])

@@ -174,6 +174,7 @@ class _Beyond:
     ends: bool
 
 
+@refusing_calls(ConfigError)
 class HopefulTask(RewardFunctions):
     """The same model's word of how much a step may pay at best: for agents that look for what pays.
 
