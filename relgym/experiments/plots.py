@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, cycle
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -32,6 +33,9 @@ _ASPECT: Final = 2.15
 
 _PIXELS: Final = 520
 """Height of a rendered scene."""
+
+_LINE: Final = 44
+"""Characters in a line of a legend, which a panel is wide enough for."""
 
 _SNAPSHOTS: Final = 5
 """Scenes that are drawn of what leaves the place where it began."""
@@ -362,7 +366,7 @@ def _draw_errors(panel: Any, shown: Trajectory, styles: _Styles) -> None:
         panel.semilogy(
             np.arange(len(error)),
             np.maximum(error, 1e-17),
-            label=label,
+            label=fill(label, _LINE),
             **(dict(styles[dream.by]) | {"ls": "-"}),
         )
     panel.axhline(STRAY, color="0.5", lw=0.8, ls="--")
