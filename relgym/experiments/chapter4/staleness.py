@@ -77,7 +77,7 @@ def outdated(page: str, digests: Mapping[str, str] | None = None) -> list[str]:
 def problem(page: str, path: str, digests: Mapping[str, str] | None = None) -> str:
     """What is wrong with a page, and the commands that mend it; empty if nothing is."""
     old = outdated(page, digests)
-    if not old or OLDER in _head(page):
+    if not old or declared(page, old) == page:
         return ""
     return (
         f"{path}: these sections were made with other code than there is now: {', '.join(old)}. Make them anew "
@@ -97,11 +97,6 @@ def declared(page: str, old: Sequence[str]) -> str:
     which = "All sections" if len(old) == len(stamped(page)) else ", ".join(old)
     line = f"{OLDER} {which}: made before the code behind them was last changed."
     return f"{title}\n\n{line}\n\n{body}"
-
-
-def _head(page: str) -> str:
-    """What stands before the first section."""
-    return page.split("\n## ")[0]
 
 
 def main(arguments: Sequence[str]) -> int:

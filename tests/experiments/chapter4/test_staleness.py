@@ -57,6 +57,8 @@ def test_a_page_may_say_that_it_is_older() -> None:
     marked = declared(text, ["table-4.2"])
     assert marked.startswith(f"# Results\n\n{OLDER} table-4.2: made before")
     assert not problem(marked, "page.md", {"table-4.1": "", "table-4.2": "0"})
+    both = problem(marked, "page.md", {"table-4.1": "0", "table-4.2": "0"})  # it names but one of them
+    assert "there is now: table-4.1, table-4.2. Make" in both
     assert declared(marked, ["table-4.2"]) == marked and declared(marked, []) == text
     assert f"{OLDER} All sections" in declared(text, ["table-4.1", "table-4.2"])
 
