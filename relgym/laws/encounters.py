@@ -206,10 +206,10 @@ class EncounterStore:
             kinds[part],
             tuple(self.kinds),
             book.tolerance,
-            np.stack([a[-1] * arms[0] + b[-1] * arms[1] for a, b in (now, free, after)]),
             part,
             self._store.arrived[part],
-            self._store.cells[part] % 2 == 0,
+            self._store.cells[part] % 2 == 0,  # see `_cell`
+            np.stack([a[-1] * arms[0] + b[-1] * arms[1] for a, b in (now, free, after)]),
         )
 
     def drop(self, places: NDArray[np.intp]) -> None:

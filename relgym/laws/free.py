@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import EVIDENCE, LEFT_OPEN
+from relgym.config.constants import LEFT_OPEN
 from relgym.laws.columns import Sources
-from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
 from relgym.laws.regions import find_laws, find_regions
 from relgym.laws.store import Store
@@ -124,10 +124,10 @@ class FreeLearner:
         return (before and before.says()) != (found and found.says())
 
     def _outdated(self, found: FreeLaw | None, tolerance: float) -> NDArray[np.intp]:
-        """Examples of a world that has changed: a law of theirs, and one of what came later, say all in fewer bits.
+        """Where examples of a world that has changed are kept (`shorter_apart`).
 
-        As `relgym.laws.pair.outdated` has it of contacts. What the later law says of earlier ones, too, isn't outdated.
-        Where other laws may hold in other regions, what is met late is another region's.
+        What the later law says of earlier ones, too, isn't outdated. Where other laws may hold in other regions, what
+        is met late is another region's.
         """
         rows, order = self.store.rows, np.argsort(self.store.arrived)
         if self.sources.where or (found is not None and not found.unexplained):
@@ -139,7 +139,7 @@ class FreeLearner:
         if then is None or now is None:
             return order[:0]
         whole = EXCEPTION_BITS * self._d * len(rows) if found is None else found.bits
-        if then.bits + now.bits + np.log2(len(rows)) + EVIDENCE >= whole:
+        if not shorter_apart(whole, then.bits, now.bits, len(rows)):
             return order[:0]
         return early[~self._explained(now, rows[early], tolerance)]
 

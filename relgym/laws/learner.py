@@ -407,8 +407,8 @@ class LawLearner:
         if encounters is None or len(encounters) < FEWEST_CONTACTS:
             return None
         found = fit_pair(encounters, rng=self._rng)
-        if (gone := outdated(encounters, found, rng=self._rng)).any() and encounters.places is not None:
-            store.drop(encounters.places[gone])
+        if len(gone := outdated(encounters, found, rng=self._rng)):
+            store.drop(gone)
             rest = store.encounters(book)
             assert rest is not None, "what came later stays"
             found = fit_pair(rest, rng=self._rng)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EVIDENCE, TIE_BITS, TOLD
-from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
+from relgym.config.constants import TIE_BITS, TOLD
+from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, shorter_apart
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.kinds import KindsFit, fit_apart, fit_together
 from relgym.laws.pieces import AxisExamples
@@ -17,7 +17,7 @@ from relgym.laws.records import ONE, Kind, PairLaw
 from relgym.numeric.changes import changed_at
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 
-__all__ = ["Encounters", "PairFit", "explained", "fit_pair", "outdated"]
+__all__ = ["Encounters", "PairFit", "explained_by", "fit_pair", "outdated"]
 
 SPLIT = 2
 """In so many of the best frames materials are told apart, should one law not be enough for all."""
@@ -39,12 +39,12 @@ class Encounters:
         The kinds.
     tolerance
         Largest residual of an explained velocity.
-    rims
-        How fast the surfaces of A and B move where they touch, against their centres and summed up, along the turned
-        normal: before, without this contact, and after it; shape ``(3, n)``. All 0 where nothing spins.
     places, arrived, foreseen
         Where each contact is kept, how many had come when it came, itself counted, and whether it came as the laws of
         that time said; shape ``(n,)``.
+    rims
+        How fast the surfaces of A and B move where they touch, against their centres and summed up, along the turned
+        normal: before, without this contact, and after it; shape ``(3, n)``. All 0 where nothing spins.
     """
 
     now: FloatArray
@@ -54,10 +54,10 @@ class Encounters:
     kinds: NDArray[np.intp]
     names: tuple[Kind, ...]
     tolerance: float
+    places: NDArray[np.intp]
+    arrived: NDArray[np.int64]
+    foreseen: NDArray[np.bool_]
     rims: FloatArray | None = None
-    places: NDArray[np.intp] | None = None
-    arrived: NDArray[np.int64] | None = None
-    foreseen: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -76,10 +76,10 @@ class Encounters:
             self.kinds[chosen],
             self.names,
             self.tolerance,
+            self.places[chosen],
+            self.arrived[chosen],
+            self.foreseen[chosen],
             None if self.rims is None else self.rims[:, chosen],
-            None if self.places is None else self.places[chosen],
-            None if self.arrived is None else self.arrived[chosen],
-            None if self.foreseen is None else self.foreseen[chosen],
         )
 
     def at_points(self) -> Encounters | None:
@@ -129,40 +129,31 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
     return best
 
 
-def outdated(encounters: Encounters, found: PairFit, *, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Contacts of a world that has changed: a law of their own, and one of what came later, say all in fewer bits.
+def outdated(encounters: Encounters, found: PairFit, *, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Where contacts of a world that has changed are kept (`shorter_apart`).
 
-    What comes later may also be what nobody did before: then one law says both as briefly, so that two must be shorter
-    by `EVIDENCE`. What the later law says of earlier contacts, too, isn't outdated.
+    What the later law says of earlier contacts, too, isn't outdated.
 
     Parameters
     ----------
     encounters
-        The contacts, with when they came, and whether as the laws of that time said.
+        The contacts.
     found
         The law of them all.
     rng
         Source of random samples.
-
-    Returns
-    -------
-    Shape ``(n,)``.
     """
-    gone = np.zeros(len(encounters), dtype=np.bool_)
-    if encounters.arrived is None or encounters.foreseen is None or found.explained.all():
-        return gone
     order = np.argsort(encounters.arrived)
-    began = changed_at(~encounters.foreseen[order])
-    if began is None:
-        return gone
-    early, late = order[:began], order[began:]
-    then, now = (fit_pair(encounters.rows(part), rng=rng).law for part in (early, late))
-    if then.bits + now.bits + np.log2(len(encounters)) + EVIDENCE < found.law.bits:
-        gone[early] = ~explained(now, encounters.rows(early))
-    return gone
+    if found.explained.all() or (began := changed_at(~encounters.foreseen[order])) is None:
+        return encounters.places[:0]
+    early, late = (encounters.rows(part) for part in (order[:began], order[began:]))
+    then, now = (fit_pair(part, rng=rng).law for part in (early, late))
+    if not shorter_apart(found.law.bits, then.bits, now.bits, len(encounters)):
+        return encounters.places[:0]
+    return early.places[~explained_by(now, early)]
 
 
-def explained(law: PairLaw, encounters: Encounters) -> NDArray[np.bool_]:
+def explained_by(law: PairLaw, encounters: Encounters) -> NDArray[np.bool_]:
     """Which contacts came as a law says, whether it is doubted of their kind or not; shape ``(n,)``."""
     seen = encounters.at_points() if law.frame == POINT else encounters
     if seen is None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from relgym.planning.actions import ActionCoder
     from relgym.planning.agent import PlanningAgent
-    from relgym.planning.doubts import DoubtedTask, HopefulTask
+    from relgym.planning.doubts import DoubtedTask, OptimisticTask
     from relgym.planning.exploration import Coverage, Explore, Familiar
     from relgym.planning.planner import Planner
     from relgym.planning.rollouts import Objective, Plan
@@ -31,9 +31,9 @@ _HOMES = {
     "EnvSimulator": "relgym.planning.simulators",
     "Explore": "relgym.planning.exploration",
     "Familiar": "relgym.planning.exploration",
-    "HopefulTask": "relgym.planning.doubts",
     "ModelSimulator": "relgym.planning.simulators",
     "Objective": "relgym.planning.rollouts",
+    "OptimisticTask": "relgym.planning.doubts",
     "PathIntegral": "relgym.planning.sequences",
     "Plan": "relgym.planning.rollouts",
     "Planner": "relgym.planning.planner",
@@ -55,9 +55,9 @@ __all__ = [
     "EnvSimulator",
     "Explore",
     "Familiar",
-    "HopefulTask",
     "ModelSimulator",
     "Objective",
+    "OptimisticTask",
     "PathIntegral",
     "Plan",
     "Planner",

@@ -19,7 +19,7 @@ from relgym.envs.dreams.rewards import TaskFunctions
 from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.numeric.changes import changed_at
-from relgym.planning.doubts import DoubtedTask, HopefulTask
+from relgym.planning.doubts import DoubtedTask, OptimisticTask
 from relgym.planning.exploration import Coverage, Familiar, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import learned_again, length, missed, mixed, right
@@ -258,7 +258,7 @@ class PlanningAgent:
             return own
         if self._doubted is None or self._doubted.model is not own:
             self._doubted = DoubtedTask(own, seed=self._seed)
-        return HopefulTask(self._doubted) if explores and self.exploration > 0.0 else self._doubted
+        return OptimisticTask(self._doubted) if explores and self.exploration > 0.0 else self._doubted
 
     def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)

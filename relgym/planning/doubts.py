@@ -16,13 +16,14 @@ from relgym.numeric.version_space import VersionSpace
 from relgym.scene.objects import TASK, Float1D, Float2D, SceneLayout
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
 
-__all__ = ["DoubtedTask", "HopefulTask"]
+__all__ = ["DoubtedTask", "OptimisticTask"]
 
 _RIGHT: Final = 1e-6
 """How far a right verdict may be off."""
 
 _LIKELY: Final = 0.5
-"""What always ended the episode does so where at least this share of the rules holds; and so much may be hoped for."""
+"""What always ended the episode does so where at least this share of the rules holds; an optimist counts
+on as many."""
 
 _REVIEW: Final = 10
 """Real steps after which the rules are drawn again at the latest, if no other mode was found and no episode ended."""
@@ -69,7 +70,10 @@ class DoubtedTask(RewardFunctions):
 
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """Expected rewards, and ends as the model says; NaN where it knows nothing."""
-        vectors = self.model.joined(layout, before, actions, after)
+        return self.expected(self.model.joined(layout, before, actions, after))
+
+    def expected(self, vectors: Float2D) -> TaskOutcome:
+        """The same of n steps as `LearnedRewardModel.joined` makes them, shape ``(n, width)``."""
         rewards, ended, modes = self.model.outcomes(vectors)
         self._review()
         known = np.isfinite(rewards)
@@ -91,11 +95,11 @@ class DoubtedTask(RewardFunctions):
                 ended = ended | (share >= _LIKELY)
                 share = np.where(ended, share, 0.0)
             worth += self._beyond.surplus * share
-        return TaskOutcome(worth, ended, np.zeros(len(before), dtype=bool))
+        return TaskOutcome(worth, ended, np.zeros(len(vectors), dtype=bool))
 
     def claims(self, vectors: Float2D) -> Iterator[tuple[Float1D, VersionSpace, bool]]:
         """Of each pair of modes: what it says n steps pay, the rules that tell where it holds, and whether it ends."""
-        for ends in (False, True):
+        for ends in sorted({group.ends for group in self._groups.values()}):
             modes, said = self.model.claims(vectors, np.full(len(vectors), ends))
             numbers = [mode.id for mode in modes]
             for (reward, _), group in self._groups.items():
@@ -175,7 +179,7 @@ class _Beyond:
 
 
 @refusing_calls(ConfigError)
-class HopefulTask(RewardFunctions):
+class OptimisticTask(RewardFunctions):
     """The same model's word of how much a step may pay at best: for agents that look for what pays.
 
     Where two modes may hold and no step has shown which, such as a stop just short of the goal, where the bonus is
@@ -197,8 +201,8 @@ class HopefulTask(RewardFunctions):
     def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
         """The most that n steps may pay, and the ends that go with it."""
         own = self._expected
-        expected = own.evaluate(layout, before, actions, after)
         vectors = own.model.joined(layout, before, actions, after)
+        expected = own.expected(vectors)
         rewards, ended = expected.rewards.copy(), expected.terminated.copy()
         for claim, rules, over in own.claims(vectors):
             more = np.flatnonzero(~(claim <= rewards + _RIGHT))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from relgym.planning.doubts import DoubtedTask, HopefulTask
+from relgym.planning.doubts import DoubtedTask, OptimisticTask
 from relgym.scene.objects import Float1D, Float2D, ObjectType, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.dyna.reward_models import LearnedRewardModel
@@ -40,7 +40,7 @@ def taught(stops: list[float], rng: np.random.Generator, *, drives: int = 150) -
 
 
 def expected(
-    model: LearnedRewardModel | DoubtedTask | HopefulTask, places: list[float], after: float = 0.0
+    model: LearnedRewardModel | DoubtedTask | OptimisticTask, places: list[float], after: float = 0.0
 ) -> Float1D:
     """Of coming to these places at that speed."""
     states: Float2D = np.array([[x, after] for x in places])
@@ -68,35 +68,37 @@ def test_a_bonus_is_surest_where_it_was_paid(rng: np.random.Generator) -> None:
     assert outside < 1.9
 
 
-def test_who_hopes_takes_what_half_of_the_rules_promise_until_it_was_tried(rng: np.random.Generator) -> None:
+def test_an_optimist_takes_what_half_of_the_rules_promise_until_it_was_tried(
+    rng: np.random.Generator,
+) -> None:
     model = taught(rng.uniform(0.1, 0.6, 14).tolist(), rng, drives=600)
     doubted = DoubtedTask(model)
     places = np.linspace(-20.0, 20.0, 161)
-    likely, best = expected(doubted, places.tolist()), expected(HopefulTask(doubted), places.tolist())
+    likely, best = expected(doubted, places.tolist()), expected(OptimisticTask(doubted), places.tolist())
     assert (best >= likely).all()
     known = (places >= 0.1) & (places <= 0.6)
     assert best[known] == pytest.approx(likely[known])
     beside = places[(best > 1.9) & ~known]
     assert len(beside) and likely[(best > 1.9) & ~known].max() < 1.97
-    assert best[np.abs(places) > 10.0].max() < 0.0  # where nothing was paid, nothing is hoped for
+    assert best[np.abs(places) > 10.0].max() < 0.0  # where nothing was paid, nothing is expected
     before, last = beside.min(), beside.min() - 0.05
     moved, _, over = step(last, 2.0, 0.0)
     for _ in range(2):  # it isn't paid there
         model.learn_step(moved, -0.02, terminated=over)
-    tried = expected(HopefulTask(doubted), [before - 0.1, last, 0.3])
+    tried = expected(OptimisticTask(doubted), [before - 0.1, last, 0.3])
     assert tried[:2].max() < 0.0 < tried[2]
 
 
-def test_who_hopes_takes_the_end_with_the_bonus(rng: np.random.Generator) -> None:
+def test_an_optimist_takes_the_end_with_the_bonus(rng: np.random.Generator) -> None:
     # A plan would be paid again and again where the bonus is one mode's and no end another's.
     model = taught(rng.uniform(0.1, 0.6, 14).tolist(), rng, drives=600)
     states: Float2D = np.array([[x, 0.0] for x in np.linspace(-3.0, 3.0, 61)])
     before = states + np.array([0.0, 2.0])
-    told = HopefulTask(DoubtedTask(model)).evaluate(SCHEMA.layout(), before, np.zeros((61, 0)), states)
+    told = OptimisticTask(DoubtedTask(model)).evaluate(SCHEMA.layout(), before, np.zeros((61, 0)), states)
     assert told.terminated[told.rewards > 1.0].all() and (told.rewards > 1.0).sum() > 5
 
 
-@pytest.mark.parametrize("kind", [DoubtedTask, lambda model: HopefulTask(DoubtedTask(model))])
+@pytest.mark.parametrize("kind", [DoubtedTask, lambda model: OptimisticTask(DoubtedTask(model))])
 def test_it_says_nothing_where_nothing_is_known(kind: Any) -> None:
     assert np.isnan(expected(kind(LearnedRewardModel(SCHEMA, {("car", "x")})), [0.0])).all()
 

@@ -102,7 +102,7 @@ LEFT_OUT = {
     "logic.Coverage": "two counts",
     "Deviation": "a record of text",
     "DoubtedTask": "needs a reward model; tried by tests of its own",
-    "HopefulTask": "needs a DoubtedTask; tried by tests of its own",
+    "OptimisticTask": "needs a DoubtedTask; tried by tests of its own",
     "EnvState": "what get_state gives, for set_state",
     "Examples": "what hypothesis classes are given",
     "FlatSpec": "tried as part of FlatView",

@@ -222,6 +222,11 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
     "a row that isn't there": (
         "truck-history", lambda b, a: a["target0.rows"].__setitem__(0, 10**6), "expected rows of the table"
     ),
+    "a contact that came later than the last": (
+        "ball-laws-history",
+        lambda b, a: a.update({"laws.contacts.arrived": np.full(len(a["laws.contacts.rows"]), 10**9)}),
+        "no more than came",
+    ),
     "a label of no mode": ("truck-history", lambda b, a: a["target0.labels"].__setitem__(0, 99), "one of"),
     "a body twice": (
         "truck-history",
