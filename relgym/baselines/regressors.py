@@ -76,6 +76,15 @@ REGRESSORS: Final[Mapping[str, Baseline[Regressor]]] = {
             _lwr,
             grid("ridge", 1e-8, 1e-12, 1e-4, 1e-2, neighbours=25),
         ),
+        *(
+            Baseline[Regressor](
+                f"lwr-{k}-printed",
+                f"LWR, k = {k}, as printed",
+                _lwr,
+                ({"neighbours": k, "scale": False, "stepwise": True},),
+            )
+            for k in (50, 25)
+        ),
         Baseline[Regressor](
             "rls",
             "recursive least squares",

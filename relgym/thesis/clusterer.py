@@ -178,10 +178,12 @@ class Clusterer:
             if general is None or not _occam(general, old, new):
                 continue
             both = np.concatenate([self.members(old.number), members])
+            # It stands where the older one stood: of modes that explain an example equally well the first one has it.
+            place = min(self.clusters.index(each) for each in (old, new) if each in self.clusters)
             for each in (old, new):
                 if each in self.clusters:
                     self._drop(each)
-            self._add(general)
+            self._add(general, place)
             fits = self._errors[general.number][both] <= self._tolerance
             self._move(both[fits], general.number)
             self._move(both[~fits], NOISE)
@@ -289,8 +291,8 @@ class Clusterer:
         return False
 
     # ------------------------------------------------------------------ bookkeeping
-    def _add(self, cluster: Cluster) -> None:
-        self.clusters.append(cluster)
+    def _add(self, cluster: Cluster, place: int | None = None) -> None:
+        self.clusters.insert(len(self.clusters) if place is None else place, cluster)
         self._next = cluster.number + 1
         self._errors[cluster.number] = np.empty(len(self._labels))
         self._measure(cluster)

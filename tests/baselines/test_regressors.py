@@ -113,6 +113,28 @@ def test_lwr_ignores_what_never_varied() -> None:
     np.testing.assert_array_equal(model.predict_batch(moved), model.predict_batch(x[200:]))
 
 
+def test_lwr_fits_stepwise_what_depends_on_few() -> None:
+    """Fewer neighbours than features: a ridge regression shares the weight out, Algorithm 1 finds the one that counts."""
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(400, 40))
+    off = []
+    for stepwise in (False, True):
+        model = LocallyWeightedRegression(20, stepwise=stepwise)
+        _taught(model, x[:300], 2.0 * x[:300, 3:4] + 1.0)
+        off.append(np.abs(model.predict_batch(x[300:]) - 2.0 * x[300:, 3:4] - 1.0).max())
+    assert off[1] < 1e-9 < 1e-2 < off[0]
+
+
+def test_lwr_measures_as_it_is_told() -> None:
+    """One neighbour: the first column differs by 2 of 1,000, the second by 1 of 1."""
+    x, y = np.array([[0.0, 0.0], [1000.0, 1.0]]), np.array([[1.0], [2.0]])
+    query = np.array([[499.0, 0.9]])
+    for scale, value in ((True, 2.0), (False, 1.0)):
+        model = LocallyWeightedRegression(1, scale=scale)
+        _taught(model, x, y)
+        assert model.predict_batch(query).tolist() == [[value]]
+
+
 def test_a_model_tree_finds_two_planes() -> None:
     x = np.random.default_rng(0).normal(size=(2000, 4))
     y = np.where(x[:, :1] > 0.0, 3.0 * x[:, 1:2] + 10.0, -x[:, 2:3])

@@ -101,6 +101,17 @@ def test_no_tree_where_clauses_are_right_often_enough() -> None:
         assert (learned.stages[-1].tree is not None) is has
 
 
+@pytest.mark.parametrize(("rare", "has"), [(59, False), (60, True), (93, True)])
+def test_thirty_examples_of_each_class_grow_a_tree_and_thirty_test_it(rare: int, has: bool) -> None:
+    """The program has a tree for 93 halts, and for 72 flights, of which three tenths would be too few to test it."""
+    numbers = [5.0] * rare + [0.0] * 1000
+    labels = np.array([1] * rare + [2] * 1000)
+    program = ThesisSettings.original(polarities=False, tree_success=1.0)  # whatever errs gets a tree, if it may
+    some = sample([0] * len(labels), numbers)
+    learned = learn_pair((1, 2), some, labels, program, np.random.default_rng(0))
+    assert (learned.stages[-1].tree is not None) is has
+
+
 def test_the_polarity_that_errs_less_is_kept() -> None:
     """Mode 1 flies or is on the floor; mode 2 is on the ramp, or, in 10 of 90 cases, flies, too."""
     states = [0] * 40 + [1] * 40 + [2] * 80 + [0] * 10

@@ -75,6 +75,20 @@ def test_a_constant_is_united_with_the_law_that_covers_it() -> None:
     assert clusterer.clusters[0].number > 1  # the united mode is a new one
 
 
+def test_a_united_mode_stands_where_the_older_one_stood() -> None:
+    """v' = v of one speed, then v' = -v, then v' = v of others: what stands still is told by the older of the two."""
+    clusterer, x = Clusterer(ThesisSettings.thesis()), rows(150)
+    x[:50, 1], x[50:, 1] = 1.0, np.where(np.arange(100) < 50, x[50:, 1] + 7.0, x[50:, 1])
+    teach(clusterer, x[:50], x[:50, 1])
+    teach(clusterer, x[50:100], -x[50:100, 1])
+    teach(clusterer, x[100:], x[100:, 1])
+    assert [role.terms[0][1] for roles, _, _ in told(clusterer) for role in roles] == pytest.approx([1.0, -1.0])
+    united, other = clusterer.clusters
+    assert united.number > other.number
+    still = np.zeros(3)
+    assert teach(clusterer, still[None], np.zeros(1)) == [united.number]
+
+
 def test_two_speeds_at_a_time_make_no_law() -> None:
     """Any two are too few values for a weight and a constant (`varied`), and a new mode meets one old one at a time."""
     clusterer = Clusterer(ThesisSettings.thesis())

@@ -33,7 +33,7 @@ _RELATIONAL: Final = ("original", "thesis", "world")
 _X: Final = ("ball.vx",)
 _BOTH: Final = ("ball.vx", "ball.vy")
 
-_LWR: Final = ("lwr-50", "lwr-25")
+_LWR: Final = ("lwr-50-printed", "lwr-25-printed", "lwr-50")
 _RESOLUTION: Final = ("bad collision resolution, vertical", "bad collision resolution, ramp slant")
 _CORNER: Final = ("bounce against a corner",)
 

@@ -42,7 +42,7 @@ def lwr_shown(_: Protocol, values: Values) -> Shown:
 
 def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
     figure, panels = canvas(10.0, 4.4)
-    panel, shades = panels[0][0], iter(("#8e6eb0", "#cda443"))
+    panel, shades = panels[0][0], iter(("#8e6eb0", "#cda443", "#5aa469"))
     for group, scores in found.items():
         ours = group in COLOURS
         colour = COLOURS[group] if ours else next(shades)

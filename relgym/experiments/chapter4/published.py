@@ -160,8 +160,8 @@ ROLLOUT_FAILURES: Final[Mapping[str, int]] = {
 
 CLASSIFIER_ERRORS: Final[Mapping[str, Mapping[int, float]]] = {
     "FOIL": {32: 0.041, 160: 0.035},
-    "svm": {32: 0.177, 160: 0.082},
-    "knn-10": {32: 0.307, 160: 0.259},
+    "svm-printed": {32: 0.177, 160: 0.082},
+    "knn-10-printed": {32: 0.307, 160: 0.259},
 }
 """Figure 4.21 as its text gives it (§4.7.2): misclassified x modes of experiment 2 after so many episodes."""
 
