@@ -218,7 +218,7 @@ def _tree(
 def _parts(
     truth: Bools, settings: ThesisSettings, rng: np.random.Generator
 ) -> tuple[Bools, Bools] | tuple[None, None]:
-    """What a tree is grown on, and what tests it: of each class `tree_least` examples at least; none if there are fewer.
+    """What a tree is grown on and tested on: of each class `tree_least` examples at least; none if there are fewer.
 
     Of 72 examples 30 test it, though the share would leave 22: Table 4.5 has a tree there, Table 4.11 one of 93.
     """

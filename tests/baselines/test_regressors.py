@@ -114,7 +114,7 @@ def test_lwr_ignores_what_never_varied() -> None:
 
 
 def test_lwr_fits_stepwise_what_depends_on_few() -> None:
-    """Fewer neighbours than features: a ridge regression shares the weight out, Algorithm 1 finds the one that counts."""
+    """Fewer neighbours than features: a ridge regression shares the weight out, Algorithm 1 finds the one."""
     rng = np.random.default_rng(0)
     x = rng.normal(size=(400, 40))
     off = []

@@ -106,7 +106,9 @@ def test_thirty_examples_of_each_class_grow_a_tree_and_thirty_test_it(rare: int,
     """The program has a tree for 93 halts, and for 72 flights, of which three tenths would be too few to test it."""
     numbers = [5.0] * rare + [0.0] * 1000
     labels = np.array([1] * rare + [2] * 1000)
-    program = ThesisSettings.original(polarities=False, tree_success=1.0)  # whatever errs gets a tree, if it may
+    program = ThesisSettings.original(
+        polarities=False, tree_success=1.0
+    )  # whatever errs gets a tree, if it may
     some = sample([0] * len(labels), numbers)
     learned = learn_pair((1, 2), some, labels, program, np.random.default_rng(0))
     assert (learned.stages[-1].tree is not None) is has

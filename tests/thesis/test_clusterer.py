@@ -82,7 +82,9 @@ def test_a_united_mode_stands_where_the_older_one_stood() -> None:
     teach(clusterer, x[:50], x[:50, 1])
     teach(clusterer, x[50:100], -x[50:100, 1])
     teach(clusterer, x[100:], x[100:, 1])
-    assert [role.terms[0][1] for roles, _, _ in told(clusterer) for role in roles] == pytest.approx([1.0, -1.0])
+    assert [role.terms[0][1] for roles, _, _ in told(clusterer) for role in roles] == pytest.approx(
+        [1.0, -1.0]
+    )
     united, other = clusterer.clusters
     assert united.number > other.number
     still = np.zeros(3)

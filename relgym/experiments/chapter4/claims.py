@@ -879,7 +879,9 @@ CLAIMS: Final = (
         "4.7.1",
         "x: third quartile of 25 neighbours beside 50, times",
         "> 1",
-        _ratio(_quantile("baseline/lwr-25-printed", _X, 0.75), _quantile("baseline/lwr-50-printed", _X, 0.75)),
+        _ratio(
+            _quantile("baseline/lwr-25-printed", _X, 0.75), _quantile("baseline/lwr-50-printed", _X, 0.75)
+        ),
         (1, 1e9),
         (0.5, 1e9),
     ),
@@ -887,7 +889,10 @@ CLAIMS: Final = (
         "4.7.1",
         "x: 95 % of LWR uncentred beside centred, times",
         "> 1",
-        _ratio(_quantile("baseline/lwr-50-printed, uncentred", _X, 0.95), _quantile("baseline/lwr-50-printed", _X, 0.95)),
+        _ratio(
+            _quantile("baseline/lwr-50-printed, uncentred", _X, 0.95),
+            _quantile("baseline/lwr-50-printed", _X, 0.95),
+        ),
         (1, 1e9),
         (0.5, 1e9),
     ),
