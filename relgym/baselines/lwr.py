@@ -143,14 +143,9 @@ def _fits(
 
 
 def _stepwise(a: NDArray[np.float64], b: Float2D, variance: float) -> Float2D:
-    """Slopes of Algorithm 1, shape ``(n, d)``; rows are weighted and centred, and weights count as many as there are.
-
-    Mirrored rows beside the rows keep the centre where it is.
-    """
+    """Slopes of Algorithm 1, shape ``(n, d)``, of rows that are weighted and centred; their weights add up to 1."""
     n, k, d = a.shape
-    units = k**0.5
-    rows, answers = (units * np.concatenate([part, -part], axis=1) for part in (a, b))
-    columns, found, _ = fit_samples(rows, answers, variance)
+    columns, found, _ = fit_samples(k**0.5 * a, k**0.5 * b, variance, centred=True)
     slopes = np.zeros((n, d + 1))
     np.put_along_axis(slopes, np.where(columns >= 0, columns, d), found, axis=1)
     return slopes[:, :d]

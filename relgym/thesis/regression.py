@@ -54,7 +54,9 @@ def fit(x: Floats, y: Floats, variance: float) -> Line:
     return Line(tuple(c for c, _ in chosen), tuple(w for _, w in chosen), float(intercept[0]))
 
 
-def fit_samples(x: Floats, y: Floats, variance: float) -> tuple[NDArray[np.intp], Floats, Floats]:
+def fit_samples(
+    x: Floats, y: Floats, variance: float, *, centred: bool = False
+) -> tuple[NDArray[np.intp], Floats, Floats]:
     """Algorithm 1 on many samples at once.
 
     Parameters
@@ -63,6 +65,8 @@ def fit_samples(x: Floats, y: Floats, variance: float) -> tuple[NDArray[np.intp]
         Shapes ``(b, n, d)`` and ``(b, n)``.
     variance
         Of the noise.
+    centred
+        Whether the centre is taken out already, by weights that the rows carry; there are no intercepts then.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def fit_samples(x: Floats, y: Floats, variance: float) -> tuple[NDArray[np.intp]
     ``(b,)``.
     """
     b, n, d = x.shape
-    mean_x, mean_y = x.mean(axis=1), y.mean(axis=1)
+    mean_x, mean_y = (np.zeros((b, d)), np.zeros(b)) if centred else (x.mean(axis=1), y.mean(axis=1))
     left = x - mean_x[:, None]
     size = np.abs(x).max(axis=1)
     left[np.abs(left) <= _CONSTANT * np.maximum(size, 1.0)[:, None]] = 0.0
