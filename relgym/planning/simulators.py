@@ -281,7 +281,6 @@ class EnvSimulator:
             )
         self._env = copy.deepcopy(inner)
         self._env.reset(seed=0)
-        self._home = inner
         self.repeat = checked_count("repeat", repeat, 1, 10**6)
         self._layout = self._env.scene.layout
 

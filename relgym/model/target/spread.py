@@ -94,11 +94,6 @@ class Spreads:
                 return spread.split.of(x[place])
         return self.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
 
-    def of_many(self, modes: NDArray[np.int64], actions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The same for n predictions, actions of shape ``(n, components)``."""
-        pairs = zip(modes.tolist(), map(tuple, actions.tolist()), strict=True)
-        return np.array([self.of(mode, action) for mode, action in pairs])
-
     def to_json(self) -> list[Any]:
         """Plain data that `from_json` reads back."""
         return [
