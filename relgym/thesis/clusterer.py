@@ -21,6 +21,9 @@ Rows = NDArray[np.intp]
 
 _FIRST = 256
 
+_ONE = 2.0**53
+"""One part in so many is what a number in double precision just below 1 differs from 1 by."""
+
 _GROWTH = 20
 """Noise grows by such a part between two searches: some 120 of them until there are 16,000 examples of it."""
 
@@ -49,6 +52,7 @@ class Clusterer:
         self.clusters: list[Cluster] = []
         self._rng = np.random.default_rng(settings.seed)
         self._tolerance = settings.inlier_stds * settings.noise_variance**0.5
+        self._units = _ONE / (2.0 * settings.noise_variance)
         self._labels = np.zeros(_FIRST, dtype=np.int64)
         self._next = NOISE + 1
         self._noise: set[int] = set()
@@ -94,7 +98,7 @@ class Clusterer:
         for cluster in self.clusters:
             errors.append(cluster.error(arrangement, row, y))
             self._errors[cluster.number][number] = errors[-1]
-        self._labels[number] = self._nearest_one(errors)
+        self._labels[number] = self._likeliest(np.array([errors]))[0]
         if self._labels[number] == NOISE:
             self._noise.add(number)
             for _ in range(self.settings.em_iterations):
@@ -108,11 +112,17 @@ class Clusterer:
             tuple(k for k in known if k not in now),
         )
 
-    def _nearest_one(self, errors: list[float]) -> int:
-        if not errors:
-            return NOISE
-        best = min(errors)
-        return self.clusters[errors.index(best)].number if best <= self._tolerance else NOISE
+    def _likeliest(self, errors: Floats) -> NDArray[np.int64]:
+        """The mode under which each example is likeliest, of errors of shape ``(n, modes)``; `NOISE` if none is near.
+
+        ``exp(-error² / 2σ²)`` in double precision: what is off by no more than rounding is 1 for every mode, and of
+        equals the oldest has the example.
+        """
+        if not self.clusters:
+            return np.full(len(errors), NOISE)
+        number = np.rint(errors**2 * self._units).argmin(axis=1)
+        near = errors[np.arange(len(errors)), number] <= self._tolerance
+        return np.where(near, np.array([c.number for c in self.clusters])[number], NOISE)
 
     # ------------------------------------------------------------------ §3.2.2
     def _discover(self) -> bool:
@@ -241,9 +251,7 @@ class Clusterer:
         if not self.clusters:
             return set()
         errors = np.stack([self._errors[c.number][:n] for c in self.clusters], axis=1)
-        best = errors.min(axis=1)
-        numbers = np.array([c.number for c in self.clusters])
-        after = np.where(best <= self._tolerance, numbers[errors.argmin(axis=1)], NOISE)
+        after = self._likeliest(errors)
         moved = np.flatnonzero(after != self.labels)
         lost = set(self.labels[moved].tolist()) - {NOISE}
         for number in np.unique(after[moved]).tolist():

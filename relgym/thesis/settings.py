@@ -308,9 +308,16 @@ DEVIATIONS: Final = (
         "original",
         "em.cpp",
         "errors within 0.1 % of one another are equal, and fewer weights decide",
-        "the smallest error decides",
+        "the likelihood decides, as printed; of equal ones the oldest mode's",
         "the rule is younger than the experiments: Table 4.9 has 93 halts, while of 13,639 examples that slide some "
         "1,000 lie still and belong to vx' = vx; they would all be halts (§4.4.2: any of equals is taken)",
+    ),
+    Deviation(
+        "thesis",
+        "§3.2.4",
+        "which of equally likely modes an example belongs to is not printed",
+        "the oldest, and a united mode is as old as the older one of the two, as in the program",
+        "where a ball falls straight down, flying and both bounces off walls are equally likely to double precision",
     ),
     Deviation(
         "original",

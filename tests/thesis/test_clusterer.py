@@ -143,6 +143,17 @@ def test_em_gives_an_example_to_the_closer_mode() -> None:
     assert clusterer.labels.tolist() == [2, 1] and clusterer.noise == 0
 
 
+@pytest.mark.parametrize(("further", "mode"), [(1e-16, 1), (1e-9, 2)])
+def test_of_equally_likely_modes_the_oldest_has_an_example(further: float, mode: int) -> None:
+    """The younger one is nearer by rounding (equal likelihoods to double precision), or by a thirtieth of σ."""
+    clusterer = Clusterer(ThesisSettings.thesis())
+    clusterer._add(Cluster(1, (Role("cart", ()),), 0.5 + further))
+    clusterer._add(Cluster(2, (Role("cart", ()),), 0.5))
+    assert teach(clusterer, rows(1), np.array([0.5])) == [mode]
+    clusterer._converge()
+    assert clusterer.labels.tolist() == [mode]
+
+
 def test_a_mode_that_lost_its_examples_goes() -> None:
     clusterer = Clusterer(ThesisSettings.thesis(noise_variance=0.01))
     teach(clusterer, rows(1), np.array([0.0]))

@@ -335,7 +335,9 @@ def _ratio(first: Measure, second: Measure) -> Measure:
 
 
 _SIX: Final = (1, 2, 3, 4, 5, 6)
-_ZERO: Final = "where a bounce comes before the first slides, -0.9 v explains T examples, of both, before v' = 0 explains as many"
+_ZERO: Final = (
+    "where a bounce comes before the first slides, -0.9 v explains T of both before v' = 0 has as many"
+)
 _TIES: Final = (
     "where a ball flies straight down or lies still two modes are right, and which one has such examples depends on "
     "rounding and on which is older"
