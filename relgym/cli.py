@@ -205,7 +205,7 @@ def rules(
         found, fresh = loaded(model), None
     else:
         subject = opened(model, env_id, pairs("--arg", arg), view)
-        found, fresh = subject.model, scenes_of(subject.env, subject.view, steps, seed=seed)
+        found, fresh = subject.model, scenes_of(subject.env, subject.view, steps, seed=_FRESH + seed)
     with _working("checking" if check else "writing"):
         if not as_json:
             typer.echo(found.describe(details=details, digits=digits, check=fresh))

@@ -43,7 +43,7 @@ MAY_IMPORT = {
     "program": frozenset({"errors"}),
     "model": LEARNERS | {"program", "reporting"},
     "thesis": CORE,
-    "baselines": CORE,
+    "baselines": CORE | {"thesis"},
     "envs": CORE,
     "wrappers": CORE | {"envs"},
     "data": CORE | {"envs", "wrappers"},
