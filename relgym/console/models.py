@@ -50,7 +50,7 @@ class ModelInEnv:
 def checked_file(path: Path) -> Path:
     """The path of a file that is there; `ModelFileError` with the nearest name where it isn't."""
     if path.is_dir():
-        models = sorted(p.name for p in path.glob("*.json"))
+        models = sorted(p.name for p in path.iterdir() if p.suffix in (".json", ".relgym"))
         inside = f"; in it are {', '.join(models[:5])}" if models else ""
         raise ModelFileError(f"{path} is a folder: expected a model's file{inside}")
     if not path.exists():
