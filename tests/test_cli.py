@@ -6,9 +6,11 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import pytest
 from typer.testing import CliRunner
 
@@ -16,6 +18,8 @@ import relgym
 from relgym.cli import app
 from relgym.experiments import demo
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Scene
+from relgym.wrappers.views import view_of
 
 RUNNER = CliRunner()
 
@@ -116,6 +120,27 @@ def test_rules_as_json_are_those_that_are_printed(folder: Path) -> None:
     laws = json.loads(run("rules", folder / "ball.json", "--json", "--check", "--steps", 50))
     assert laws["motion"] in WorldModel.load(folder / "ball.json").describe()
     assert "of 50" in laws["agreement"] or "50 " in laws["agreement"]
+
+
+def test_rules_are_checked_on_scenes_that_learning_has_not_seen(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from relgym.wrappers import follower
+
+    asked: list[Scene] = []
+
+    def noted(*arguments: Any, **named: Any) -> Iterator[Scene]:
+        for scene in scenes_of(*arguments, **named):
+            asked.append(scene)
+            yield scene
+
+    scenes_of = follower.scenes_of
+    monkeypatch.setattr(follower, "scenes_of", noted)
+    run("rules", folder / "ball.json", "--check", "--steps", 5)
+    env = gym.make("relgym/BallBoxRamp-v0")
+    learned = list(scenes_of(env, view_of(env), 5, seed=0))
+    assert len(asked) == 5
+    assert not any((a.vector == b.vector).all() for a, b in zip(asked, learned, strict=True))
 
 
 def test_explain_a_scene_of_the_models_env(folder: Path) -> None:
