@@ -111,7 +111,8 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
 
     Notes
     -----
-    Cost: *Running and exporting* has the figures (`docs/guides/running-and-exporting.md`). Memory: some 8 KB for each dream of seven objects.
+    Cost: *Running and exporting* has the figures (`docs/guides/running-and-exporting.md`). Memory: some 8 KB for each
+    dream of seven objects.
     """
 
     schema: SceneSchema

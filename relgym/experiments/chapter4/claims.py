@@ -1113,9 +1113,10 @@ def claims_shown(_: Protocol, values: Values) -> Shown:
     )
     batches = len(seen["1/original"])
     note = (
-        f"{len(CLAIMS)} claims: {told}.\n{batches} of the thesis' 50 batches, three of experiment 3, one of baselines "
-        "and of noise, tested on\nall 24,000 examples. The bands are ours: the thesis prints no spread; rates are called the "
-        "same within 30 %,\nthose of single modes within a factor 1.5."
+        f"{len(CLAIMS)} claims: {told}.\n"
+        f"{batches} of the thesis' 50 batches, three of experiment 3, one of baselines and of noise, tested on all\n"
+        "24,000 examples. The bands are ours: the thesis prints no spread; rates are called the same within 30 %,\n"
+        "those of single modes within a factor 1.5."
     )
     notes = [textwrap.fill(f"({k}) {why}", 116, subsequent_indent="    ") for k, why in enumerate(reasons, 1)]
     return Shown("\n\n".join([table([str(h) for h in heading], lines), note, *notes]), [heading, *lines])
