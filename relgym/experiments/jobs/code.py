@@ -54,7 +54,7 @@ their functions. `tests/experiments/chapter4/test_apart.py` looks at what is run
 
 
 @cache
-def code_version(module: str, without: tuple[str, ...] = ()) -> str:
+def code_version(module: str, without: tuple[str, ...] = (), *, libraries: bool = True) -> str:
     """Hexadecimal digest of the code behind a module, and of the versions of the libraries that they import.
 
     A change anywhere else leaves it as it is (what draws a figure isn't what measured it), and so does one of comments
@@ -66,6 +66,8 @@ def code_version(module: str, without: tuple[str, ...] = ()) -> str:
         Its name.
     without
         As of `modules_behind`.
+    libraries
+        Whether versions of libraries count, which differ from one machine to another.
 
     Raises
     ------
@@ -73,11 +75,11 @@ def code_version(module: str, without: tuple[str, ...] = ()) -> str:
         There is no such module.
     """
     digest = hashlib.sha256()
-    libraries: set[str] = set()
+    imported: set[str] = set()
     for name in modules_behind(module, without):
         digest.update(f"{name} {_content(name)}\n".encode())
-        libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
-    for library in sorted(libraries):
+        imported |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
+    for library in sorted(imported) if libraries else ():
         digest.update(f"{library} {_version(_LIBRARIES[library])}\n".encode())
     return digest.hexdigest()
 
