@@ -33,7 +33,7 @@ _STAMP: Final = re.compile(r"; code `([0-9a-f]{12})`")
 
 @cache
 def digest_of(name: str) -> str:
-    """Twelve hexadecimal digits of the code behind a section: all of relgym that its tasks import, or what draws it.
+    """Twelve hexadecimal digits of the code behind a section: all that its tasks import, or else what draws it.
 
     Parameters
     ----------
@@ -43,8 +43,7 @@ def digest_of(name: str) -> str:
     job = JOBS[name]
     show = getattr(job.show, "func", job.show)
     tasks = [task for group in job.plan(Protocol.fast(1)).values() for task in group]
-    behind = {(task.function.partition(":")[0], task.without) for task in tasks} or {(show.__module__, ())}
-    versions = sorted(code_version(module, without, libraries=False) for module, without in behind)
+    versions = sorted({task.version for task in tasks} or {code_version(show.__module__)})
     return hashlib.sha256(" ".join(versions).encode()).hexdigest()[:12]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -54,7 +54,7 @@ their functions. `tests/experiments/chapter4/test_apart.py` looks at what is run
 
 
 @cache
-def code_version(module: str, without: tuple[str, ...] = (), *, libraries: bool = True) -> str:
+def code_version(module: str, without: tuple[str, ...] = ()) -> str:
     """Hexadecimal digest of the code behind a module, and of the versions of the libraries that they import.
 
     A change anywhere else leaves it as it is (what draws a figure isn't what measured it), and so does one of comments
@@ -66,8 +66,6 @@ def code_version(module: str, without: tuple[str, ...] = (), *, libraries: bool 
         Its name.
     without
         As of `modules_behind`.
-    libraries
-        Whether versions of libraries count, which differ from one machine to another.
 
     Raises
     ------
@@ -75,11 +73,11 @@ def code_version(module: str, without: tuple[str, ...] = (), *, libraries: bool 
         There is no such module.
     """
     digest = hashlib.sha256()
-    imported: set[str] = set()
+    libraries: set[str] = set()
     for name in modules_behind(module, without):
         digest.update(f"{name} {_content(name)}\n".encode())
-        imported |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
-    for library in sorted(imported) if libraries else ():
+        libraries |= {found.split(".")[0] for found in _imports(name)} & _LIBRARIES.keys()
+    for library in sorted(libraries):
         digest.update(f"{library} {_version(_LIBRARIES[library])}\n".encode())
     return digest.hexdigest()
 
@@ -181,7 +179,16 @@ def _source(module: str) -> bytes | None:
 
 
 def _version(distribution: str) -> str:
+    """The installed version, or else the one that a checkout pins: a page is as old wherever it is looked at."""
     try:
-        return version(distribution)
+        return version(distribution).partition("+")[0]  # of PyTorch's builds any
     except PackageNotFoundError:
-        return "none"
+        return _pinned().get(distribution, "none")
+
+
+@cache
+def _pinned() -> Mapping[str, str]:
+    """Versions in ``constraints.txt``, by distribution; empty away from a checkout."""
+    file = Path(__file__).resolve().parents[3] / "constraints.txt"
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    return {name: number for name, found, number in (line.partition("==") for line in lines) if found}
