@@ -63,6 +63,9 @@ FCL = "relgym.scene.geometry.fcl"
 """The only module that may import python-fcl."""
 MACHINE = "relgym.program.machine"
 """The only module that may import llvmlite."""
+GPU = "relgym.program.gpu"
+"""The only module that may import CuPy."""
+ALONE = (("fcl", FCL), ("llvmlite", MACHINE), ("cupy", GPU))
 
 HEAVY = (
     "fcl",
@@ -127,14 +130,12 @@ def test_the_core_needs_five_libraries_alone() -> None:
         for m in modules()
         if m.package in CORE
         for i in m.imports
-        if _third_party(i) and (m.name, _distribution(i)) not in {(FCL, "fcl"), (MACHINE, "llvmlite")}
+        if _third_party(i) and (m.name, _distribution(i)) not in {(user, library) for library, user in ALONE}
     ]
-    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, fcl in {FCL}, llvmlite in {MACHINE}\n" + "\n".join(
-        wrong
-    )
+    assert not wrong, f"only {sorted(CORE_LIBRARIES)}, and {dict(ALONE)}\n" + "\n".join(wrong)
 
 
-@pytest.mark.parametrize(("library", "user"), [("fcl", FCL), ("llvmlite", MACHINE)])
+@pytest.mark.parametrize(("library", "user"), ALONE)
 def test_only_one_module_imports(library: str, user: str) -> None:
     users = {module.name for module in modules() if any(_distribution(i) == library for i in module.imports)}
     assert users == {user}

@@ -7,7 +7,9 @@ from threading import Lock, Thread
 from typing import Final
 
 from relgym.errors import SlowWarning
+from relgym.program.gpu import Card
 from relgym.program.machine import Machine, make
+from relgym.program.tape import Sizes
 
 __all__ = ["KERNEL", "Kernel"]
 
@@ -39,6 +41,7 @@ class Kernel:
         self._missing = ""  # why it can't be had
         self._warned = False
         self._loader: Thread | None = None
+        self._card: Card | None = None
         self._turn = Lock()
 
     def after(self, scenes: int) -> Machine | None:
@@ -58,6 +61,19 @@ class Kernel:
         if self._missing and not self._warned:
             self._warn()
         return self.machine
+
+    def card(self, sizes: Sizes) -> Card:
+        """A graphics card with a kernel for programs of some sizes, which takes seconds to compile.
+
+        Raises
+        ------
+        CardError
+            There is none.
+        """
+        with self._turn:
+            if self._card is None or not self._card.fits(sizes):
+                self._card = Card(sizes)
+            return self._card
 
     def _make(self) -> None:
         with self._turn:

@@ -36,16 +36,18 @@ from relgym.model.prediction import (
 )
 from relgym.model.querying import Said, derive, settled
 from relgym.model.regression import Regression
+from relgym.model.rolling import BatchRollout
 from relgym.model.scenes import wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
+from relgym.program.gpu import Card
 from relgym.program.machine import Machine
 from relgym.program.records import Answer, BeyondError, Program, Trust
 from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["Programs", "Runner"]
+__all__ = ["PATIENCE", "Programs", "Runner"]
 
 PATIENCE = 2
 """A program is lowered for the last of so many scenes that are asked since what a model says has changed; arrays answer
@@ -220,7 +222,7 @@ class Runner:
             self._space[name][0, :count] for name in told
         )  # where the kernel leaves what it says
         self._given, self._given_values = (self._space[name][0] for name in ("given", "given_values"))
-        self._many = machine.run
+        self._machine = machine
         space, now, after = (each.ctypes.data for each in (self._space, self._now, self._after))
         self._one = partial(_run_one, machine.call, space, now, after)
         pair = None if parts.laws is None else parts.laws.learner.book.pair
@@ -235,6 +237,7 @@ class Runner:
 
     def _lay(self, tape: Tape) -> None:
         """Take note of where what changes often stands in the tape that is run, and write what holds now."""
+        self._sizes = tape.sizes
         self._places, self._latest = tape.votes, tape.latest
         self._regressions = self._reaches_at(tape.reaches)
         self._votes = [None for places, _ in tape.votes for _ in places]
@@ -282,22 +285,79 @@ class Runner:
             for r, targets, starts in known
         ]
 
-    def many(self, vectors: NDArray[np.float64]) -> BatchPrediction | None:
-        """Predict what follows n scenes; None: arrays must, or can say why not."""
+    def many(self, vectors: NDArray[np.float64], *, on_card: bool = False) -> BatchPrediction | None:
+        """Predict what follows n scenes; None: arrays must, or can say why not.
+
+        Parameters
+        ----------
+        vectors
+            State vectors, shape ``(n, width)``.
+        on_card
+            Whether a graphics card does it.
+
+        Raises
+        ------
+        CardError
+            There is none.
+        """
         if (settling := self._settles()) is None:
             return None
         n, count = shape = len(vectors), len(self._keys)
         following, outcomes = np.empty(vectors.shape), np.empty(shape, dtype=np.int8)
         modes, margins = np.empty(shape, dtype=np.int64), np.empty(shape)
         sure = np.full((2, n, count), np.nan)
+        told = outcomes, modes, margins, sure
         with self._turn:
-            if self._many(
-                self._space, vectors, following, (outcomes, modes, margins, sure), settling=settling
-            ):
-                return None
+            if on_card:
+                bad = self._card().run(self._tape(), vectors, following, told, settling=settling)
+            else:
+                bad = self._machine.run(self._space, vectors, following, told, settling=settling)
+        if bad:
+            return None
         return BatchPrediction(
             self._layout, following, self._keys, modes, outcomes, margins, self._frames, *sure
         )
+
+    def roll(
+        self,
+        vectors: NDArray[np.float64],
+        steps: int,
+        actions: NDArray[np.float64],
+        first: int,
+        *,
+        on_card: bool = False,
+    ) -> BatchRollout | None:
+        """Roll n scenes out; None: arrays must, or can say why not.
+
+        Parameters
+        ----------
+        vectors, on_card
+            As for `many`.
+        steps, actions, first
+            As for `relgym.program.machine.Machine.roll`.
+
+        Raises
+        ------
+        CardError
+            There is no card.
+        """
+        if (settling := self._settles()) is None:
+            return None
+        asked = vectors, steps, actions, first
+        with self._turn:
+            if on_card:
+                following, lasted = self._card().roll(self._tape(), *asked, settling=settling)
+            else:
+                following, lasted = self._machine.roll(self._space, *asked, settling=settling)
+        return None if (lasted < 0).any() else BatchRollout(self._layout, following, lasted)
+
+    def _card(self) -> Card:
+        return KERNEL.card(self._sizes)
+
+    def _tape(self) -> tuple[_Bits, NDArray[np.float64]]:
+        """The tape as it is now."""
+        sizes = self._sizes
+        return self._space["code"][0, : sizes.code], self._space["numbers"][0, : sizes.numbers]
 
     def _settles(self) -> bool | None:
         """Whether it is known how right predictions were; then the kernel is told. None: it has no words for that."""

@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-__all__ = ["Array", "CompileError", "Type", "assembly"]
+__all__ = ["Array", "CompileError", "Type", "Variant", "assembly"]
 
 
 class CompileError(Exception):
@@ -84,7 +84,33 @@ _REAL: Final = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fd
 _COMPARED: Final = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 
 
-def assembly(entries: Mapping[str, tuple[Callable[..., Any], tuple[Type, ...]]], space: np.dtype[Any]) -> str:
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """What is to be understood otherwise than it was written.
+
+    Attributes
+    ----------
+    constants
+        What names of constants mean: sizes of another work space, for example.
+    elsewhere
+        Fields that don't lie in the work space, and aren't written to: where they lie instead, as LLVM's assembly says.
+    instead
+        Functions that are called instead of others.
+    lanes
+        Whether several rounds of loops over `lanes` are made at once.
+    """
+
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    instead: Mapping[Callable[..., Any], Callable[..., Any]] = field(default_factory=dict)
+    lanes: bool = True
+
+
+def assembly(
+    entries: Mapping[str, tuple[Callable[..., Any], tuple[Type, ...]]],
+    space: np.dtype[Any],
+    variant: Variant = Variant(),
+) -> str:
     """LLVM's assembly of some functions and of all that they call.
 
     Parameters
@@ -94,13 +120,15 @@ def assembly(entries: Mapping[str, tuple[Callable[..., Any], tuple[Type, ...]]],
         name is looked up where each was defined.
     space
         What arguments of type ``"space"`` point at: fields that are arrays.
+    variant
+        What is to be understood otherwise than it was written.
 
     Raises
     ------
     CompileError
         Something is said that there is no word for here.
     """
-    module = _Module(space)
+    module = _Module(space, variant)
     for name, (function, types) in entries.items():
         module.function(function, types, name)
     return module.text()
@@ -133,6 +161,7 @@ class _Module:
     """What was written so far."""
 
     space: np.dtype[Any]
+    variant: Variant
     functions: dict[tuple[Any, tuple[Type, ...]], _Function] = field(default_factory=dict)
     begun: int = 0
     """How many functions were begun."""
@@ -167,6 +196,8 @@ class _Module:
 
     def vectorized(self) -> str:
         """What is said of one more loop that is to work on several numbers at once."""
+        if not self.variant.lanes:
+            return ""
         self.loops += 1
         return f", !llvm.loop !{_LOOPS + self.loops}"
 
@@ -516,6 +547,8 @@ class _Writer:
     def named(self, node: ast.expr) -> Any:
         """What a name means where the function was defined."""
         if isinstance(node, ast.Name):
+            if node.id in self.module.variant.constants:
+                return self.module.variant.constants[node.id]
             if node.id in self.names:
                 return self.names[node.id]
             builtin = {"abs": abs, "min": min, "max": max, "float": float, "int": int}
@@ -532,7 +565,9 @@ class _Writer:
             raise CompileError(ast.unparse(node))
         kind, offset = self.module.space.fields[node.attr][:2]
         base, shape = kind.subdtype or (kind, ())
-        address = self.new(f"getelementptr inbounds i8, ptr {owner.text}, i64 {offset}")
+        address = self.module.variant.elsewhere.get(node.attr, "")
+        if not address:
+            address = self.new(f"getelementptr inbounds i8, ptr {owner.text}, i64 {offset}")
         return Value(Array(_ELEMENTS[base.name], shape, node.attr), address)
 
     def address(self, array: ast.expr, index: ast.expr) -> tuple[Any, str]:
@@ -698,6 +733,10 @@ class _Writer:
         if isinstance(node.func, ast.Name | ast.Attribute):
             function = self.named(node.func)
             values = [self.value(a) for a in node.args]
+            if function in self.module.variant.instead:
+                return self.called(
+                    self.module.variant.instead[function], [self.to(v, "double") for v in values]
+                )
             if function in {min, max} and len(values) == 2:
                 return self.extreme(function is min, *values)
             if function is abs:

@@ -36,6 +36,7 @@ from relgym.program.tape import (
     MOST_CONTACTS,
     MOVERS,
     NEXTS,
+    NOBODY,
     OFFSETS,
     OTHERS,
     PAIRS,
@@ -53,7 +54,7 @@ from relgym.program.tape import (
     WIDTH,
 )
 
-__all__ = ["run", "see"]
+__all__ = ["forget", "roll", "run", "see"]
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
 """Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
@@ -1859,6 +1860,74 @@ def run(s, n, settling, telling, writing, vectors, following, outcomes, modes, m
                 if settling:
                     sure[at], sure[n * answers + at] = s.sure[k, 0], s.sure[k, 1]
     return 0
+
+
+def roll(s, n, apart_by, steps, settling, first, count, actions, vectors, following, lasted):
+    """So many steps of n scenes, each from what was predicted last, for as long as all of it is predicted.
+
+    Parameters
+    ----------
+    s
+        Work space with the tape in it.
+    n
+        How many scenes.
+    apart_by
+        How many scenes there are actions of in each step, which may be more.
+    steps
+        How many steps, at most.
+    settling
+        As for `run`.
+    first, count
+        Column of the first number of an action, and how many there are.
+    actions
+        Actions: step by step, scene by scene.
+    vectors
+        State vectors, one after the other.
+    following
+        Where those go that were predicted last.
+    lasted
+        Where it goes how many steps were predicted; why not, below 0, of scenes that can't be.
+    """
+    width, nexts, answers = s.code[WIDTH], s.code[AT_NEXTS], s.code[ANSWERS]
+    s.x[2 * width], s.x[2 * width + 1], s.x[2 * width + 2] = math.nan, 0.0, 1.0
+    for i in range(n):
+        now, wrong, done = i * width, 0, np.int64(0)
+        for k in lanes(width):
+            s.x[k] = vectors[now + k]
+            wrong += not abs(s.x[k]) < math.inf
+        while wrong == 0 and done < steps:
+            given = (done * apart_by + i) * count
+            for k in range(count):
+                s.x[first + k] = actions[given + k]
+                wrong += not abs(s.x[first + k]) < math.inf
+            for k in range(s.code[NEXTS]):
+                column = s.code[nexts + k]
+                s.x[width + column] = s.x[column]
+            bad = step(s, settling, False) if wrong == 0 else np.int64(NOT_FINITE)
+            if bad:
+                done = -bad
+                break
+            sure = True
+            for k in range(answers):
+                sure = sure and s.outcomes[k] == PREDICTED
+            if not sure:
+                break
+            for k in range(s.code[NEXTS]):
+                column = s.code[nexts + k]
+                s.x[column] = s.x[width + column]
+                wrong += not abs(s.x[column]) < math.inf
+            done += 1
+        if wrong:
+            done = np.int64(-NOT_FINITE)
+        lasted[i] = done
+        for k in lanes(width):
+            following[now + k] = s.x[k]
+
+
+def forget(s):
+    """Know nothing of scenes that were asked before: a work space that holds zeros may be used then."""
+    for k in range(s.believed.shape[0]):
+        s.believed[k, 0] = NOBODY
 
 
 def see(s, t, vector, table, close, struck, told, order):

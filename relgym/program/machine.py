@@ -25,11 +25,14 @@ from numpy.typing import NDArray
 
 from relgym.program.compiling import Array, Type, assembly
 
-__all__ = ["Machine", "build", "folders", "main", "make"]
+__all__ = ["SEE", "Machine", "build", "entries", "folders", "main", "make", "optimized"]
 
-_RUN, _SEE = "relgym_run", "relgym_see"
+_RUN, _ROLL, SEE = "relgym_run", "relgym_roll", "relgym_see"
 _ADDRESS, _NUMBER = ctypes.c_void_p, ctypes.c_int64
 _RUNNING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(ctypes.c_bool,) * 3, *(_ADDRESS,) * 6)
+_ROLLING: Final = ctypes.CFUNCTYPE(
+    _NUMBER, _ADDRESS, *(_NUMBER,) * 3, ctypes.c_bool, *(_NUMBER,) * 2, *(_ADDRESS,) * 4
+)
 _SEEING: Final = ctypes.CFUNCTYPE(_NUMBER, _ADDRESS, _NUMBER, *(_ADDRESS,) * 6)
 _DIGEST: Final = 32
 """Length of the digest that a file begins with."""
@@ -55,7 +58,8 @@ class Machine:
         self._engine.finalize_object()
         self.call = _RUNNING(self._engine.get_function_address(_RUN))
         """`relgym.program.kernel.run` on addresses, of arrays that lie in one piece."""
-        self.see = _SEEING(self._engine.get_function_address(_SEE))
+        self._roll = _ROLLING(self._engine.get_function_address(_ROLL))
+        self.see = _SEEING(self._engine.get_function_address(SEE))
         """`relgym.program.kernel.see`, likewise."""
 
     def run(
@@ -88,6 +92,45 @@ class Machine:
         vectors = np.ascontiguousarray(vectors, dtype=np.float64)
         places = (each.ctypes.data for each in (space, vectors, following, *told))
         return int(self.call(next(places), len(vectors), settling, False, True, *places))
+
+    def roll(
+        self,
+        space: NDArray[Any],
+        vectors: NDArray[np.float64],
+        steps: int,
+        actions: NDArray[np.float64],
+        first: int,
+        *,
+        settling: bool,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Many steps of many scenes, each from what was predicted last.
+
+        Parameters
+        ----------
+        space
+            Work space with the tape in it.
+        vectors
+            State vectors, shape ``(n, width)``.
+        steps
+            How many steps.
+        actions
+            The numbers of actions, shape ``(steps, n, k)``; k is 0 where those in the state vectors stay.
+        first
+            Column of their first one.
+        settling
+            As for `run`.
+
+        Returns
+        -------
+        The last state vectors of which all was predicted, and of how many steps that was; below 0 of a scene that can't
+        be.
+        """
+        vectors, actions = (np.ascontiguousarray(each, dtype=np.float64) for each in (vectors, actions))
+        following, lasted = np.empty(vectors.shape), np.empty(len(vectors), dtype=np.int64)
+        numbers = len(vectors), len(vectors), steps, settling, first, actions.shape[-1]
+        places = (each.ctypes.data for each in (space, actions, vectors, following, lasted))
+        self._roll(next(places), *numbers, *places)
+        return following, lasted
 
 
 def _target() -> Any:
@@ -196,26 +239,51 @@ def _empty() -> NDArray[Any]:
 
 def build() -> bytes:
     """Compile the kernel here and now; an object file."""
-    import llvmlite.binding as llvm
-
-    from relgym.program import kernel
     from relgym.program.tape import SPACE
 
-    entries: dict[str, tuple[Callable[..., Any], tuple[Type, ...]]] = {
-        _RUN: (kernel.run, ("space", "i64", "i1", "i1", "i1", *_flat("double double i8 i64 double double"))),
-        _SEE: (kernel.see, ("space", "i64", *_flat("double i8 i8 i8 double i64"))),
-    }
-    module = llvm.parse_assembly(assembly(entries, SPACE))
+    module, target = _optimized(assembly(entries(), SPACE), _target())
+    return bytes(target.emit_object(module))
+
+
+def optimized(text: str, processor: str) -> str:
+    """LLVM's assembly for some kind of processor, which it names, as the assembly of that kind."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(llvm.parse_assembly(text).triple)
+    module, machine = _optimized(text, target.create_target_machine(cpu=processor, opt=3))
+    return str(machine.emit_assembly(module))
+
+
+def _optimized(text: str, target: Any) -> tuple[Any, Any]:
+    import llvmlite.binding as llvm
+
+    module = llvm.parse_assembly(text)
     module.verify()
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
     # One scene at a time, few of anything: vectors of LLVM's and loops written out cost a second and win nothing.
     tuning.loop_vectorization = tuning.slp_vectorization = tuning.loop_unrolling = False
-    target = _target()
     builder = llvm.create_pass_builder(target, tuning)
     builder.getModulePassManager().run(module, builder)
-    return bytes(target.emit_object(module))
+    return module, target
 
 
 def _flat(elements: str) -> tuple[Type, ...]:
     """Types of arrays, none of which overlaps another one, by those of their entries."""
     return tuple(Array(element, (0,), f"given {k}") for k, element in enumerate(elements.split()))
+
+
+def entries() -> dict[str, tuple[Callable[..., Any], tuple[Type, ...]]]:
+    """What is compiled, and the types of its arguments, by the names under which others call it."""
+    from relgym.program import kernel
+
+    return {
+        _RUN: (kernel.run, ("space", "i64", "i1", "i1", "i1", *_flat("double double i8 i64 double double"))),
+        _ROLL: (
+            kernel.roll,
+            ("space", *("i64",) * 3, "i1", *("i64",) * 2, *_flat("double double double i64")),
+        ),
+        "relgym_forget": (kernel.forget, ("space",)),
+        SEE: (kernel.see, ("space", "i64", *_flat("double i8 i8 i8 double i64"))),
+    }

@@ -10,13 +10,14 @@ import math
 from base64 import b64decode
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.program import records as ir
 
-__all__ = ["Tape", "encoded", "kind_of", "ordered"]
+__all__ = ["Sizes", "Tape", "encoded", "kind_of", "ordered", "space_of"]
 
 HEADER = 28
 (
@@ -56,75 +57,113 @@ RELATION_KINDS = {
 """What a relation is, for the kernel; those along an axis count from here, in the axes' order."""
 
 
-MOST_REGISTERS, MOST_CONTACTS, MOST_CORNERS, MOST_RELATIONS, MOST_FEATURES = 4096, 128, 16, 16, 64
-MOST_MODES, MOST_VARIABLES, MOST_ROLES, MOST_KEYS = 64, 12, 12, 256
-MOST_CODE, MOST_NUMBERS, MOST_ANSWERS, MOST_SHOWN = 65536, 131072, 512, 512
-"""What a work space has room for."""
+class Sizes(NamedTuple):
+    """What a work space has room for: how many of each."""
+
+    code: int
+    numbers: int
+    registers: int
+    bodies: int
+    corners: int
+    contacts: int
+    relations: int
+    features: int
+    modes: int
+    variables: int
+    roles: int
+    keys: int
+    answers: int
+    shown: int
+    remembered: int
+    """Relational states that a kernel remembers answers of: a power of two."""
+
 
 REMEMBERED, REMEMBERED_MODES, REMEMBERED_ROLES = 512, 8, 6
 """Relational states that a kernel remembers answers of (a power of two), and of how many modes and roles."""
 
+MOST_CONTACTS = 128
+
+MOST = Sizes(
+    code=65536,
+    numbers=131072,
+    registers=4096,
+    bodies=ir.MOST_BODIES,
+    corners=16,
+    contacts=MOST_CONTACTS,
+    relations=16,
+    features=64,
+    modes=64,
+    variables=12,
+    roles=12,
+    keys=256,
+    answers=512,
+    shown=512,
+    remembered=REMEMBERED,
+)
+"""Of the work space that one kernel, compiled once, runs any program in."""
+
 NOBODY = -(1 << 62)
 """No kind of predictions."""
 
-_K = ir.MOST_BODIES
-SPACE = np.dtype(
-    [
-        ("code", np.int64, (MOST_CODE,)),  # the tape
-        ("numbers", np.float64, (MOST_NUMBERS,)),
-        ("x", np.float64, (MOST_REGISTERS,)),  # registers
-        ("body", np.float64, (_K, 12)),  # place, bounding box, sizes for coarse numbers, size of the box
-        ("placed", np.int64, (_K,)),  # whether a body's edges are worked out
-        ("edge", np.float64, (5, _K, MOST_CORNERS)),  # starts, outward normals, lengths
-        ("gap", np.float64, (4, _K, _K)),  # distance and normal, first < second
-        ("known", np.int64, (2, _K, _K)),  # when measured; when touching was asked for, and 1 if so
-        ("velocity", np.float64, (4, 3, _K)),  # now, next if free, next, next by an alternative law
-        ("contact", np.float64, (MOST_CONTACTS, 16)),
-        ("pair", np.int64, (MOST_CONTACTS, 3)),  # its number, first and second body
+
+def space_of(most: Sizes) -> np.dtype[np.void]:
+    """Where a scene is worked on, in fixed places: a kernel is handed one address, whatever the program."""
+    bodies, modes, answers = most.bodies, most.modes, most.answers
+    fields: list[tuple[str, Any, tuple[int, ...]]] = [
+        ("code", np.int64, (most.code,)),  # the tape
+        ("numbers", np.float64, (most.numbers,)),
+        ("x", np.float64, (most.registers,)),  # registers
+        ("body", np.float64, (bodies, 12)),  # place, bounding box, sizes for coarse numbers, size of the box
+        ("placed", np.int64, (bodies,)),  # whether a body's edges are worked out
+        ("edge", np.float64, (5, bodies, most.corners)),  # starts, outward normals, lengths
+        ("gap", np.float64, (4, bodies, bodies)),  # distance and normal, first < second
+        ("known", np.int64, (2, bodies, bodies)),  # when measured; when touching was asked for, and 1 if so
+        ("velocity", np.float64, (4, 3, bodies)),  # now, next if free, next, next by an alternative law
+        ("contact", np.float64, (most.contacts, 16)),
+        ("pair", np.int64, (most.contacts, 3)),  # its number, first and second body
         ("features", np.float64, (6,)),  # what laws read of a contact
-        ("body_flags", np.int64, (4, _K)),  # stated, known, involved, stated by the law in force
-        ("told", np.float64, (_K, MOST_FEATURES)),  # pair features of a target
+        ("body_flags", np.int64, (4, bodies)),  # stated, known, involved, stated by the law in force
+        ("told", np.float64, (bodies, most.features)),  # pair features of a target
         # Contexts of a target; whose they are; among whom relations are known; the time; whether they are written out.
         ("masks", np.int64, (7,)),
-        ("kinds", np.int64, (_K, _K)),  # how bodies stand to each other: bits of kinds of relations
-        ("rows", np.int64, (MOST_RELATIONS, _K)),  # to whom an object stands in a relation
-        ("columns", np.int64, (MOST_RELATIONS, _K)),  # who stands in a relation to an object
-        ("value", np.int64, (MOST_VARIABLES,)),  # objects of variables
-        ("left", np.int64, (MOST_VARIABLES,)),  # objects still to try
-        ("found", np.int64, (MOST_VARIABLES,)),  # objects that a variable can stand for
-        ("votes", np.int64, (MOST_MODES, MOST_MODES)),  # by how much a mode leads
-        ("order", np.int64, (3, MOST_MODES)),
-        ("hashes", np.uint64, (3, _K + 1)),
-        ("lost", np.int64, (MOST_KEYS,)),  # properties that could not be predicted
-        ("lineup", np.int64, (1, _K)),  # bodies in canonical order
-        ("options", np.float64, ((MOST_ROLES + 1) ** 2, 4)),  # candidates of roles
-        ("cast", np.int64, (5, _K + 2)),
-        ("outcomes", np.int64, (MOST_ANSWERS,)),  # of each answer
-        ("modes", np.int64, (MOST_ANSWERS,)),
-        ("margins", np.float64, (MOST_ANSWERS,)),
-        ("players", np.int64, (MOST_ANSWERS, MOST_ROLES)),  # bodies bound to its roles
-        (
-            "believed",
-            np.int64,
-            (MOST_ANSWERS, 2),
-        ),  # the last kind of an answer's predictions, and what is made of it
-        ("sure", np.float64, (MOST_ANSWERS, 2)),  # probability and interval of each answer
+        ("kinds", np.int64, (bodies, bodies)),  # how bodies stand to each other: bits of kinds of relations
+        ("rows", np.int64, (most.relations, bodies)),  # to whom an object stands in a relation
+        ("columns", np.int64, (most.relations, bodies)),  # who stands in a relation to an object
+        ("value", np.int64, (most.variables,)),  # objects of variables
+        ("left", np.int64, (most.variables,)),  # objects still to try
+        ("found", np.int64, (most.variables,)),  # objects that a variable can stand for
+        ("votes", np.int64, (modes, modes)),  # by how much a mode leads
+        ("order", np.int64, (3, modes)),
+        ("hashes", np.uint64, (3, bodies + 1)),
+        ("lost", np.int64, (most.keys,)),  # properties that could not be predicted
+        ("lineup", np.int64, (1, bodies)),  # bodies in canonical order
+        ("options", np.float64, ((most.roles + 1) ** 2, 4)),  # candidates of roles
+        ("cast", np.int64, (5, max(bodies, most.roles) + 2)),
+        ("outcomes", np.int64, (answers,)),  # of each answer
+        ("modes", np.int64, (answers,)),
+        ("margins", np.float64, (answers,)),
+        ("players", np.int64, (answers, most.roles)),  # bodies bound to its roles
+        # The last kind of an answer's predictions, and what is made of it.
+        ("believed", np.int64, (answers, 2)),
+        ("sure", np.float64, (answers, 2)),  # probability and interval of each answer
         # What others say of an answer: 0: nothing, 1: it is known, 2: it isn't; and its value.
-        ("given", np.int64, (MOST_ANSWERS,)),
-        ("given_values", np.float64, (MOST_ANSWERS,)),
-        ("touched", np.int64, (MOST_ANSWERS,)),  # whom a mover touches; or the mode that gave a value
+        ("given", np.int64, (answers,)),
+        ("given_values", np.float64, (answers,)),
+        ("touched", np.int64, (answers,)),  # whom a mover touches; or the mode that gave a value
         # What the winner, the guess, both regressions and the mode that held last say of each answer; NaN: nothing.
-        ("experts", np.float64, (MOST_ANSWERS, 5)),
+        ("experts", np.float64, (answers, 5)),
         ("fitted", np.int64, (1,)),  # what regressions look at lies in `shown`; 0: nothing does
-        ("shown", np.float64, (2, MOST_SHOWN)),  # that, and how far from what they know
+        ("shown", np.float64, (2, most.shown)),  # that, and how far from what they know
         ("leverage", np.float64, (2,)),  # of both regressions there
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
-        ("memory_keys", np.uint64, (REMEMBERED,)),
-        ("memory", np.int64, (REMEMBERED, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
-    ],
-    align=True,
-)
-"""Where a scene is worked on, in fixed places: a kernel is handed one address, whatever the program."""
+        ("memory_keys", np.uint64, (most.remembered,)),
+        ("memory", np.int64, (most.remembered, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
+    ]
+    return np.dtype(fields, align=True)
+
+
+SPACE = space_of(MOST)
+"""The work space of the kernel that is compiled once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,8 +176,8 @@ class Tape:
         Whole numbers, shape ``(c,)``.
     numbers
         Shape ``(m,)``.
-    roles
-        Most roles of a mode that are cast, 1 at least.
+    sizes
+        The least that a work space must have room for.
     votes
         Of every answer that is voted for, in order: where the votes of each contest begin in the code, and where its
         modes stand in the order in which they win ties.
@@ -151,7 +190,7 @@ class Tape:
 
     code: NDArray[np.int64]
     numbers: NDArray[np.float64]
-    roles: int
+    sizes: Sizes
     votes: tuple[tuple[tuple[int, ...], int], ...] = ()
     latest: tuple[tuple[int, dict[int, int]], ...] = ()
     reaches: tuple[int, ...] = ()
@@ -178,24 +217,25 @@ def encoded(program: ir.Program) -> Tape:
     """
     writer = _Writer(program)
     tape = writer.tape()
-    sizes = {
-        "columns of regressions": (writer.shown, MOST_SHOWN),
-        "numbers": (program.registers, MOST_REGISTERS),
-        "bodies": (len(program.bodies), ir.MOST_BODIES),
-        "corners of a body": (max((len(b.outline) for b in program.bodies), default=0), MOST_CORNERS),
-        "relations": (len(program.relations), MOST_RELATIONS),
-        "features of pairs": (len(program.facts) + tape.code[OTHERS], MOST_FEATURES),
-        "modes": (max((len(a.modes) for a in program.answers), default=0), MOST_MODES),
-        "variables of a clause": (writer.variables, MOST_VARIABLES),
-        "roles of a mode": (tape.roles, MOST_ROLES),
-        "properties": (tape.code[KEYS], MOST_KEYS),
-        "whole numbers": (len(tape.code), MOST_CODE),
-        "constants": (len(tape.numbers), MOST_NUMBERS),
-        "answers": (len(program.answers), MOST_ANSWERS),
+    what = {
+        "shown": "columns of regressions",
+        "registers": "numbers",
+        "bodies": "bodies",
+        "corners": "corners of a body",
+        "relations": "relations",
+        "features": "features of pairs",
+        "modes": "modes",
+        "variables": "variables of a clause",
+        "roles": "roles of a mode",
+        "keys": "properties",
+        "code": "whole numbers",
+        "numbers": "constants",
+        "answers": "answers",
     }
-    for what, (size, most) in sizes.items():
+    for name, words in what.items():
+        size, most = getattr(tape.sizes, name), getattr(MOST, name)
         if size > most:
-            raise ir.BeyondError(f"{size} {what}, of which there may be {most}")
+            raise ir.BeyondError(f"{size} {words}, of which there may be {most}")
     return tape
 
 
@@ -268,10 +308,30 @@ class _Writer:
         return Tape(
             np.array(self.code, dtype=np.int64),
             np.array(self.numbers),
-            self.roles,
+            self._sizes(),
             tuple(self.votes),
             tuple(self.latest),
             tuple(self.reaches),
+        )
+
+    def _sizes(self) -> Sizes:
+        p = self.program
+        return Sizes(
+            code=len(self.code),
+            numbers=len(self.numbers),
+            registers=p.registers,
+            bodies=len(p.bodies),
+            corners=max((len(b.outline) for b in p.bodies), default=0),
+            contacts=0 if p.motion is None else min(len(p.motion.pairs), MOST_CONTACTS),
+            relations=len(p.relations),
+            features=len(p.facts) + self.code[OTHERS],
+            modes=max((len(a.modes) for a in p.answers), default=0),
+            variables=self.variables,
+            roles=self.roles,
+            keys=self.code[KEYS],
+            answers=len(p.answers),
+            shown=self.shown,
+            remembered=0,
         )
 
     def _note_nexts(self) -> None:

@@ -117,12 +117,12 @@ def _terms(count: int) -> ir.Program:
 @pytest.mark.parametrize(
     ("make", "most", "what"),
     [
-        (lambda n: _many(registers=n), tapes.MOST_REGISTERS, "numbers"),
-        (lambda n: _many(relations=("intersect",) * n), tapes.MOST_RELATIONS, "relations"),
-        (lambda n: _many(facts=("distance",) * n), tapes.MOST_FEATURES, "features of pairs"),
-        (_modes, tapes.MOST_MODES, "modes"),
-        (_answers, tapes.MOST_ANSWERS, "answers"),
-        (lambda n: _answers(n, keys=n), tapes.MOST_KEYS, "properties"),
+        (lambda n: _many(registers=n), tapes.MOST.registers, "numbers"),
+        (lambda n: _many(relations=("intersect",) * n), tapes.MOST.relations, "relations"),
+        (lambda n: _many(facts=("distance",) * n), tapes.MOST.features, "features of pairs"),
+        (_modes, tapes.MOST.modes, "modes"),
+        (_answers, tapes.MOST.answers, "answers"),
+        (lambda n: _answers(n, keys=n), tapes.MOST.keys, "properties"),
     ],
 )
 def test_what_there_is_no_room_for(make: Any, most: int, what: str) -> None:
@@ -138,14 +138,14 @@ def _regressed(width: int) -> ir.Program:
 
 
 def test_there_is_room_for_so_many_constants() -> None:
-    encoded(_regressed(tapes.MOST_SHOWN - 4))
+    encoded(_regressed(tapes.MOST.shown - 4))
     with pytest.raises(ir.BeyondError, match="constants, of which there may be 131072"):
-        encoded(_regressed(tapes.MOST_SHOWN))
+        encoded(_regressed(tapes.MOST.shown))
 
 
 def test_there_is_room_for_regressions_on_so_many_columns() -> None:
     with pytest.raises(ir.BeyondError, match="513 columns of regressions, of which there may be 512"):
-        encoded(_regressed(tapes.MOST_SHOWN + 1))
+        encoded(_regressed(tapes.MOST.shown + 1))
 
 
 @given(st.integers(0, 6), st.integers(-4, 1 << 40), st.integers(-2, 7), st.integers(0, 31))
