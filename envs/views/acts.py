@@ -13,6 +13,7 @@ from relgym.envs.actions import without_action
 from relgym.envs.arguments import action_numbers
 from relgym.envs.views.records import identifiers
 from relgym.errors import ActionError, ConfigError
+from relgym.model.scenes import scene_of
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene, SceneLayout
 
 __all__ = ["MOST_CHOICES", "Acts"]
@@ -127,7 +128,7 @@ class Acts:
             known = self._latest = bare.layout, found, found.offsets[found.index(ACTION)]
         _, layout, at = known  # objects stand in schema order
         parts = (bare.vector[:at], self.values(action), bare.vector[at:])
-        return Scene(schema, layout, np.concatenate(parts))
+        return scene_of(schema, layout, np.concatenate(parts))
 
 
 def _numbered(count: int) -> tuple[str, ...]:

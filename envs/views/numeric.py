@@ -18,6 +18,7 @@ from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
 from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
+from relgym.model.scenes import scene_of
 from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
 __all__ = ["NumbersView"]
@@ -183,7 +184,7 @@ class NumbersView:
         if how.pairs or len(how.constants):
             angles = [self._decoded(pair, numbers) for pair in how.pairs]
             numbers = np.concatenate([numbers, angles, how.constants])
-        return Scene(self.schema, how.layout, numbers[how.gather])
+        return scene_of(self.schema, how.layout, numbers[how.gather])
 
     def check_actions(self, space: spaces.Space[Any]) -> None:
         """Raise `ConfigError` unless the view can read actions of a space."""

@@ -36,7 +36,7 @@ class Drift:
 
     count: int = 0
     pairs: int = 0
-    total: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    total: list[float] = field(default_factory=lambda: [0.0] * 3)
     squares: float = 0.0
     steps: float = 0.0
     _last: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
@@ -46,7 +46,8 @@ class Drift:
         here, there = now.tolist(), after.tolist()
         change = [b - a for a, b in zip(here, there, strict=True)]
         self.count += 1
-        self.total[: len(change)] += change
+        for k, c in enumerate(change):
+            self.total[k] += c
         self.squares += sum([c * c for c in change])
         last = self._last.get(name)
         if last is not None and last[0] == here:
@@ -58,16 +59,16 @@ class Drift:
         """Whether changes are as little alike as noise is, as far as that is known."""
         if self.pairs < FEWEST:
             return True
-        variance = self.squares / self.count - float(((self.total / self.count) ** 2).sum())
+        variance = self.squares / self.count - sum([(t / self.count) * (t / self.count) for t in self.total])
         return self.steps / self.pairs >= INDEPENDENT * variance
 
     def to_json(self) -> list[float | int | list[float]]:
         """Plain data that `restore` reads back; a change begins a new run."""
-        return [self.count, self.pairs, self.total.tolist(), self.squares, self.steps]
+        return [self.count, self.pairs, list(self.total), self.squares, self.steps]
 
     def restore(self, data: Sequence[float | int | list[float]]) -> None:
         """Take over what `to_json` wrote."""
         count, pairs, total, squares, steps = data
         self.count, self.pairs = int(count), int(pairs)  # type: ignore[arg-type]
-        self.total = np.array(total, dtype=np.float64)
+        self.total = [float(t) for t in total]  # type: ignore[union-attr]
         self.squares, self.steps = float(squares), float(steps)  # type: ignore[arg-type]

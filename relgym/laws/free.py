@@ -103,7 +103,7 @@ class FreeLearner:
 
     def confirms(self, more: int) -> bool:
         """Whether so many more examples that the law explains change nothing but the choice of those kept."""
-        return not any(_power_of_two(self.seen + k + 1) for k in range(more))
+        return not any([_power_of_two(self.seen + k + 1) for k in range(more)])
 
     def confirm(self, x: NDArray[np.float64], after: NDArray[np.float64]) -> None:
         """`learn_one` of an example that the law explains, where `confirms` says that this is all."""

@@ -8,6 +8,7 @@ was derived from it is derived again from the raw contacts.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -211,34 +212,32 @@ class LawLearner:
             that are kept, and later.
         """
         self._rescale(cast, vector)
-        if set(off) != set(cast.movers) or any(not error <= self.book.tolerance for error in off.values()):
+        tolerance = self.book.tolerance
+        if len(off) != len(cast.movers) or not all(
+            [off.get(body, math.inf) <= tolerance for body in cast.movers]
+        ):
             return False
-        degree = [0] * len(cast.layout.bodies)
         touching = (
             [k for k, (a, b) in enumerate(cast.pairs) if b in touched[a]] if any(touched.values()) else []
         )
         if touching and self.book.turning:
             return False  # whether they touch in one point is to be looked at
+        degree = [0] * len(cast.layout.bodies)
         for pair in touching:
             for body in cast.pairs[pair]:
                 degree[body] += 1
         free = [body for body in cast.movers if not degree[body]]
-        if not self._confirms(cast, free):
-            return False
-        single = self._single(cast, touching, degree)
-        if single and (
-            _doubled(self._store.seen + len(single), len(single))
-            or any(cast.kinds[pair] not in self._store.kinds for pair in single)
-        ):
+        single = self._single(cast, touching, degree) if touching else []
+        if not self._confirms(cast, free) or not self._expects(cast, single):
             return False
         after = cast.padded_one(following)[cast.velocities]
         state = cast.padded_one(vector)
         for body in free:
             sources, places = cast.sources[body]
-            d = len(sources.velocity)
+            d, type_name, x = len(sources.velocity), sources.type.name, state[places]
             name = cast.layout.names[cast.layout.bodies[body]]
-            self._drift[sources.type.name].add(name, state[places[:d]], after[:d, body])
-            self._free[sources.type.name].confirm(state[places], after[: len(sources.moving), body])
+            self._drift[type_name].add(name, x[:d], after[:d, body])
+            self._free[type_name].confirm(x, after[: len(sources.moving), body])
         self._count(cast, dict.fromkeys(cast.movers, True), degree, single)
         for pair in single:
             assert isinstance(self._store, EncounterStore), "of bodies that turn none is single here"
@@ -253,10 +252,17 @@ class LawLearner:
             counts[name] = counts.get(name, 0) + 1
         for name, more in counts.items():
             learner = self._free[name]
-            due = [learner.seen + k + 1 in ESTIMATE_AT for k in range(more)]
-            if not learner.confirms(more) or any(due):
+            seen = range(learner.seen + 1, learner.seen + more + 1)
+            if not learner.confirms(more) or any([k in ESTIMATE_AT for k in seen]):
                 return False
         return True
+
+    def _expects(self, cast: Cast, single: Sequence[int]) -> bool:
+        """Whether these single contacts, which came as the laws said, change nothing but those kept."""
+        store = self._store
+        if single and _doubled(store.seen + len(single), len(single)):
+            return False
+        return all([cast.kinds[pair] in store.kinds for pair in single])
 
     def _assess(self, cast: Cast, motion: Motion, body: int, after: NDArray[np.float64]) -> bool:
         count = len(self.book.components(cast.sources[body][0].type.name))
@@ -265,7 +271,7 @@ class LawLearner:
 
     def _count(self, cast: Cast, right: Mapping[int, bool], degree: Sequence[int], single: list[int]) -> None:
         """Enter every mover in the ledger; laws are learned from free ones and from single contacts."""
-        taught = {body for pair in single for body in cast.pairs[pair]}
+        taught = {body for pair in single for body in cast.pairs[pair]} if single else ()
         for body, was in right.items():
             learned = degree[body] == 0 or body in taught
             self._ledger.count(cast.sources[body][0].type.name, right=was, learned=learned)

@@ -101,7 +101,7 @@ class Store:
 
     def _make_room(self, cell: int) -> int | None:
         """Place of a row to replace; None where the new row's own cell is crowded and it isn't drawn."""
-        most, crowded = max((count, -number) for number, count in self._cell_counts().items())
+        most, crowded = max([(count, -number) for number, count in self._cell_counts().items()])
         # A reservoir within the crowded cell: later rows come in ever more rarely.
         if cell == -crowded and self._rng.random() > most / self.seen:
             return None

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -129,8 +129,9 @@ class Assessment(NamedTuple):
     spread: float
 
 
+@lru_cache
 def key_of(outcome: int, winner: int, margin: float) -> Key:
-    """The cell of a prediction."""
+    """The cell of a prediction; most margins come again and again."""
     if not margin > 0.0:
         return Key(outcome, winner, 0)
     if math.isinf(margin):

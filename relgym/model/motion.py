@@ -151,24 +151,26 @@ class Laws:
             return False
         cast = self.learner.book.cast(layout)
         bodies, wanted = cast.bodies, self._predicted(cast)
-        said: dict[int, int] = {}
+        said = dict.fromkeys(wanted, 0)
         off: dict[int, float] = {}
         touched: dict[int, list[int]] = {}
         places, came = layout.places, following.tolist()
         for one in told.parts:
-            body = bodies.get(one.object, -1)
-            if one.property not in wanted.get(body, ()):
+            name, prop = one.object, one.property
+            body = bodies.get(name, -1)
+            if prop not in wanted.get(body, ()):
                 continue
             if not one.ok or len(one.roles) < one.mode or one.mode not in (FREE, TOUCHING):
                 return False  # a batch tells no roles
-            error = abs(one.value - came[places[one.object, one.property]])
-            said[body] = said.get(body, 0) + 1
-            off[body] = max(off.get(body, 0.0), error)
-            touched[body] = [bodies[name] for name in one.roles[1:]]
-        if any(
-            [not components or said.get(body, 0) != len(components) for body, components in wanted.items()]
-        ):
-            return False
+            error = abs(one.value - came[places[name, prop]])
+            said[body] += 1
+            if not error <= off.get(body, 0.0):
+                off[body] = error
+            touched[body] = [bodies[other] for other in one.roles[1:]]
+        for body, components in wanted.items():
+            if not components or said[body] != len(components):
+                return False
+            off.setdefault(body, 0.0)
         perception = percept.perception
         return self.learner.confirm(
             cast,

@@ -123,6 +123,7 @@ class Parts:
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
         self._kin: dict[int, SceneSchema] = {}
+        self._fine: Scene | None = None
         self._known: dict[int, SceneLayout] = {}
         self._answers: dict[int, tuple[SceneLayout, dict[tuple[str, str], Answer]]] = {}
         self._undiscovered: dict[int, tuple[SceneLayout, list[tuple[Target, int, int]]]] = {}
@@ -131,7 +132,7 @@ class Parts:
 
     def __getstate__(self) -> dict[str, Any]:
         by_identity = ("_kin", "_known", "_answers", "_undiscovered")  # a copy's objects are others
-        return self.__dict__ | {name: {} for name in by_identity}
+        return self.__dict__ | {name: {} for name in by_identity} | {"_fine": None}
 
     def admits(self, scene: object) -> bool:
         """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
@@ -140,7 +141,16 @@ class Parts:
         schema = scene.schema
         if schema is not self.schema and self._kin.get(id(schema)) is not schema:
             return False  # `check` looks at it once
-        return finite(scene.vector)
+        return self._finite(scene)
+
+    def _finite(self, scene: Scene) -> bool:
+        """Whether all numbers of a scene are finite; of the one that was asked last that is known."""
+        if scene is self._fine:
+            return True
+        fine = finite(scene.vector)
+        if fine:
+            self._fine = scene
+        return fine
 
     def knows(self, layout: SceneLayout) -> bool:
         """Whether it can predict scenes of a layout; `checked_batch` says why not."""
@@ -171,7 +181,7 @@ class Parts:
                     "differ, their types may not"
                 )
             self._kin[id(schema)] = schema  # kept alive, so that its id stays its own
-        if not finite(scene.vector):
+        if not self._finite(scene):
             schema.scene(scene.values())  # raises, naming object and property
         if scene.layout.bodies:
             check_sizes(scene)

@@ -13,12 +13,14 @@ from relgym.config.checks import checked_count
 from relgym.errors import ConfigError, ObservationError
 from relgym.html import html_table
 from relgym.model.learning import LearnReport
-from relgym.model.prediction import ScenePrediction
+from relgym.model.prediction import Outcome, ScenePrediction
 from relgym.model.reports.text import Cell, table
 from relgym.model.target.hindsight import WRONG
 from relgym.scene.objects import Scene, Transition
 
 __all__ = ["WRONG", "Key", "Outcomes", "Prequential", "StepReport", "compared"]
+
+_PREDICTED = Outcome.PREDICTED
 
 Key: TypeAlias = tuple[str, str]
 """An object and one of its properties."""
@@ -96,7 +98,7 @@ class Outcomes:
     def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
         """What became of a prediction; `residuals` are those of `compared`."""
         places, angles, now = before.layout.places, before.layout.angles, before.vector.tolist()
-        parts, offs, changes, claimed, spreads = list[Key](), [], [], [], []
+        rows = []
         for part in prediction.parts:
             key = part.object, part.property
             off = residuals.get(key)
@@ -105,14 +107,10 @@ class Outcomes:
             column = places[key]
             # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual.
             moved = part.value - now[column]
-            if column in angles:
+            if angles and column in angles:
                 moved = math.remainder(moved, 2.0 * math.pi)
-            parts.append(key)
-            offs.append(off)
-            changes.append(off + moved)
-            claimed.append(part.ok)
-            spreads.append(part.spread)
-        return cls(tuple(parts), tuple(offs), tuple(changes), tuple(claimed), tuple(spreads))
+            rows.append((key, off, off + moved, part.outcome is _PREDICTED, part.spread))
+        return cls(*zip(*rows, strict=True)) if rows else cls((), (), (), (), ())
 
 
 class Prequential:
@@ -154,10 +152,12 @@ class Prequential:
         if outcomes is not None:
             self._outcomes.append(outcomes)
         for key in predicted:
-            self.predictions[key] = self.predictions.get(key, 0) + 1
-            self.wrong.setdefault(key, 0)
-        self._window.append(tuple(wrong))
-        for key in self._window[-1]:
+            if key not in self.wrong:
+                self.predictions[key] = self.wrong[key] = 0
+            self.predictions[key] += 1
+        found = tuple(wrong)
+        self._window.append(found)
+        for key in found:
             self.wrong[key] += 1
 
     @property
@@ -246,9 +246,12 @@ def compared(
                 continue
             column = after.layout.column(after.layout.index(part.object), part.property)
         came = numbers[column]
-        off = residuals[key] = came - part.value
-        if column in angles:  # π and -π are the same place
-            off = residuals[key] = math.remainder(off, 2.0 * math.pi)
-        if not part.ok or not abs(off) <= max(WRONG, precision * max(1.0, abs(came))):
+        off = came - part.value
+        if angles and column in angles:  # π and -π are the same place
+            off = math.remainder(off, 2.0 * math.pi)
+        residuals[key] = off
+        if part.outcome is not _PREDICTED or not (
+            abs(off) <= WRONG or abs(off) <= precision * max(1.0, abs(came))
+        ):
             wrong.append(key)
     return residuals, tuple(wrong)

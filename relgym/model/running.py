@@ -37,7 +37,7 @@ from relgym.model.prediction import (
 from relgym.model.querying import Said, derive, settled
 from relgym.model.regression import Regression
 from relgym.model.rolling import BatchRollout
-from relgym.model.scenes import wrap
+from relgym.model.scenes import scene_of, wrap
 from relgym.model.target.spread import Spreads, action_columns
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
@@ -433,7 +433,7 @@ class Runner:
         else:
             derive(scene.schema, self._layout, now[None], following[None])
             wrap(self._layout, following)
-        return ScenePrediction(Scene(scene.schema, self._layout, following), tuple(found))
+        return ScenePrediction(scene_of(scene.schema, self._layout, following), tuple(found))
 
     def sure(self, scene: Scene) -> ScenePrediction | None:
         """Predict what follows one scene, if the program knows how right its predictions were; else None.
@@ -480,7 +480,7 @@ class Runner:
                     Audit(key, values, speaker),
                 )
             )
-        return ScenePrediction(Scene(scene.schema, self._layout, after), tuple(found))
+        return ScenePrediction(scene_of(scene.schema, self._layout, after), tuple(found))
 
     def _told(
         self,

@@ -20,6 +20,7 @@ __all__ = [
     "mismatch",
     "next_values",
     "passage",
+    "scene_of",
     "unwrapped",
     "with_action",
     "wrap",
@@ -42,6 +43,14 @@ def with_action(scene: Scene, values: Sequence[float] | NDArray[np.float64]) -> 
         raise ObservationError(f"action: expected {vector[where].shape} values, got shape {np.shape(values)}")
     vector[where] = values
     return Scene(scene.schema, layout, vector)
+
+
+def scene_of(schema: SceneSchema, layout: SceneLayout, vector: NDArray[np.float64]) -> Scene:
+    """A scene of numbers that are known to fit its layout, which becomes their owner: nothing is looked at again."""
+    vector.flags.writeable = False
+    scene = Scene.__new__(Scene)
+    scene.schema, scene.layout, scene.vector = schema, layout, vector
+    return scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -499,11 +499,11 @@ class WorldModel:
         self, prediction: ScenePrediction, residuals: Mapping[tuple[str, str], float], precision: float
     ) -> Retrospect:
         layout, expected = prediction.scene.layout, prediction.scene.vector
-        told = [(part.object, part.property, part.value) for part in prediction.parts]
+        places = layout.places
         came = [
-            (layout.places[name, prop], value + residuals[name, prop])
-            for name, prop, value in told
-            if (name, prop) in residuals
+            (places[key], part.value + off)
+            for part in prediction.parts
+            if (off := residuals.get(key := (part.object, part.property))) is not None
         ]
         if not self._parts.screen.plausible(layout, expected, came):
             return Retrospect({}, counted=False)

@@ -24,7 +24,7 @@ def test_sums_by_hand() -> None:
     # Changes 1, 3, -2: their sum is 2, of squares 14; they differ by 2 and -5, of squares 29.
     drift = fed([1.0, 3.0, -2.0])
     assert (drift.count, drift.pairs, drift.squares, drift.steps) == (3, 2, 14.0, 29.0)
-    assert drift.total.tolist() == [2.0, 0.0, 0.0]
+    assert drift.total == [2.0, 0.0, 0.0]
 
 
 def test_only_consecutive_changes_of_one_object_are_pairs() -> None:
