@@ -19,7 +19,7 @@ from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
 from relgym.model.calibration import OWN, Calibration, Key
-from relgym.model.prediction import Prediction, ScenePrediction
+from relgym.model.prediction import Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Answer, Parts
@@ -193,8 +193,9 @@ class _Look:
     """What is found out as one looks back at the predictions of a step, in their order."""
 
     def __init__(self, parts: Parts, precision: float) -> None:
-        self._parts, self._precision = parts, precision
+        self._parts, self._precision, self._laws = parts, precision, parts.laws
         config = parts.config
+        self._share = config.downsampling
         noise = config.clustering.noise_std
         # Who says how large the noise is takes it for granted.
         self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
@@ -214,27 +215,30 @@ class _Look:
     def repeats(self, part: Prediction, residual: float, answer: Answer) -> bool:
         """Whether a prediction came out as such ones do and another one stands for it: it is counted, no more."""
         self._times = self._stands = 0
-        record, target, model = part.record, answer.target, answer.model
+        record, (target, model, _, _, _) = part.record, answer
         if record is None:
             return False
-        lawful = self._parts.governs(target)
-        standing = Standing.SETTLED if lawful else model.standing
-        if standing is Standing.COARSE:
-            return self._passed(part, residual, answer, record.key)
-        if not part.ok or not part.mode or record.speaker != OWN:
-            return False
-        within = self._rounding(part.value + residual) if lawful else model.clusterer.scale.tolerance
-        if not abs(residual) <= within or not (
-            lawful or (standing is Standing.SETTLED and not self._misled(answer))
-        ):
-            return False
-        self._times = model.calibration.confirm(record.key, self._parts.config.downsampling, self._draw)
+        lawful = self._laws is not None and self._laws.governs(target)
         if not lawful:
-            self.confirmed[part.object, part.property] = Confirmed(part.mode, self._times)
+            standing = model.standing
+            if standing is Standing.COARSE:
+                return self._passed(part, residual, answer, record.key)
+            if standing is not Standing.SETTLED or self._misled(answer):
+                return False
+        if part.outcome is not Outcome.PREDICTED or not part.mode or record.speaker != OWN:
+            return False
+        within = (
+            self._rounding(part.value + residual) if lawful else model.clusterer.population.scale.tolerance
+        )
+        if not abs(residual) <= within:
+            return False
+        self._times = model.calibration.confirm(record.key, self._share, self._draw)
+        if lawful:
+            return not self._times
+        self.confirmed[part.object, part.property] = Confirmed(part.mode, self._times)
         if self._times:
             return False
-        if not lawful:
-            self.counts.setdefault(target, [0, 0])[0] += 1
+        self.counts.setdefault(target, [0, 0])[0] += 1
         return True
 
     def _passed(self, part: Prediction, residual: float, answer: Answer, key: Key) -> bool:
@@ -243,7 +247,7 @@ class _Look:
         What lies far outside of its interval is news, which is learned from in any case; how right such predictions are
         is learned from the same share of those as of others.
         """
-        if not self._parts.config.downsampling:
+        if not self._share:
             return False
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
