@@ -30,6 +30,10 @@ THREADS, GROUPS = 128, 16
 """Threads of a group, and groups for each multiprocessor at most: hardly any steps a second depend on them."""
 
 
+MANY: Final = 1 << 20
+"""Scenes that lie on a card at once, at most: a million of 65 numbers are 0.5 GB, and as many next ones."""
+
+
 class CardError(Exception):
     """There is no card, or nothing to use it with: why, and what to do."""
 
@@ -158,7 +162,7 @@ class Card:
     Raises
     ------
     CardError
-        There is no card, or no CuPy.
+        There is no card, or no CuPy, or the program is too large for it.
     """
 
     def __init__(self, sizes: Sizes) -> None:
@@ -168,10 +172,10 @@ class Card:
             file = Path(folder) / "kernel.ptx"
             file.write_text(ptx(self.sizes))
             module = cupy.RawModule(path=str(file))
-            self._roll, self._run = (
-                module.get_function("relgym_roll_each"),
-                module.get_function("relgym_run_each"),
-            )
+            try:
+                self._roll, self._run = map(module.get_function, ("relgym_roll_each", "relgym_run_each"))
+            except cupy.cuda.driver.CUDADriverError as error:
+                raise CardError(f"the card refuses a program of this size: {error}") from None
         self._code = cupy.ndarray((self.sizes.code,), np.int64, module.get_global("relgym_code"))
         self._numbers = cupy.ndarray((self.sizes.numbers,), np.float64, module.get_global("relgym_numbers"))
         self._most = GROUPS * cupy.cuda.Device().attributes["MultiProcessorCount"]
@@ -191,9 +195,23 @@ class Card:
         settling: bool,
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """As `relgym.program.machine.Machine.roll`, of the two arrays of a tape."""
-        n, cupy = len(vectors), self._cupy
         self._lay(tape)
-        now, taken = cupy.asarray(vectors), cupy.asarray(actions)
+        parts = [
+            self._rolled(vectors[k : k + MANY], steps, actions[:, k : k + MANY], first, settling)
+            for k in range(0, max(len(vectors), 1), MANY)
+        ]
+        return np.concatenate([after for after, _ in parts]), np.concatenate([lasted for _, lasted in parts])
+
+    def _rolled(
+        self,
+        vectors: NDArray[np.float64],
+        steps: int,
+        actions: NDArray[np.float64],
+        first: int,
+        settling: bool,
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        n, cupy = len(vectors), self._cupy
+        now, taken = cupy.asarray(vectors), cupy.asarray(np.ascontiguousarray(actions))
         after, lasted = cupy.empty_like(now), cupy.empty(n, dtype=np.int64)
         numbers = map(np.int64, (n, settling, steps, first, actions.shape[-1]))
         self._roll(self._grid(n), (THREADS,), (*numbers, taken, now, after, lasted))

@@ -19,6 +19,7 @@ from relgym.program import gpu
 from relgym.program.gpu import Card, CardError, ptx, roomy
 from relgym.program.machine import _optimized, _target
 from relgym.program.tape import Sizes, space_of
+from relgym.scene.objects import ACTION
 
 
 def _no_card() -> str:
@@ -49,15 +50,15 @@ class Imitation(Card):
         given = [a if isinstance(a, int | np.integer) else a.ctypes.data for a in arguments]
         return int(function(*given))
 
-    def begin(self, tape: tuple[NDArray[np.int64], NDArray[np.float64]]) -> None:
+    def _lay(self, tape: tuple[NDArray[np.int64], NDArray[np.float64]]) -> None:
         for name, part in zip(("relgym_code", "relgym_numbers"), tape, strict=True):
             ctypes.memmove(self._engine.get_global_value_address(name), part.ctypes.data, part.nbytes)
         self._space[:] = 0
         self.call("relgym_forget", self._space)
 
-    def roll(self, tape: Any, vectors: Any, steps: int, actions: Any, first: int, *, settling: bool) -> Any:
-        self.begin(tape)
+    def _rolled(self, vectors: Any, steps: int, actions: Any, first: int, settling: bool) -> Any:
         after, lasted, n = np.empty(vectors.shape), np.empty(len(vectors), np.int64), len(vectors)
+        actions = np.ascontiguousarray(actions)
         for i in range(n):
             numbers = 1, n, steps, int(settling), first, actions.shape[-1]
             taken = actions.reshape(-1)[i * actions.shape[-1] :]
@@ -65,7 +66,7 @@ class Imitation(Card):
         return after, lasted
 
     def run(self, tape: Any, vectors: Any, following: Any, told: Any, *, settling: bool) -> int:
-        self.begin(tape)
+        self._lay(tape)
         outcomes, modes, margins, sure = told
         known, wrong = np.empty((len(vectors), 2, outcomes.shape[1])), 0
         for i in range(len(vectors)):
@@ -112,6 +113,20 @@ def test_what_it_is_given(name: str, imitated: None) -> None:
 def test_what_a_card_says(name: str) -> None:
     for model in (MODELS[name](), looked_back(MODELS[name](), 1)):
         assert_same(*asked_of(model))
+
+
+def test_scenes_go_there_a_part_at_a_time(imitated: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, vectors = asked_of(MODELS["cart"]())
+    where = asked._layout.slice(asked._layout.index(ACTION))
+    actions = np.random.default_rng(0).uniform(0.0, 10.0, size=(5, len(vectors), where.stop - where.start))
+    whole = asked.roll(vectors, 5, actions, where.start)
+    monkeypatch.setattr(gpu, "MANY", 7)
+    parts = asked.roll(vectors, 5, actions, where.start, on_card=True)
+    assert whole is not None and parts is not None
+    np.testing.assert_array_equal(parts.vectors, whole.vectors)
+    np.testing.assert_array_equal(parts.lasted, whole.lasted)
+    nobody = asked.roll(vectors[:0], 5, actions[:, :0], where.start, on_card=True)
+    assert nobody is not None and nobody.vectors.shape == (0, vectors.shape[1])
 
 
 def test_a_larger_program_gets_a_kernel_of_its_own(imitated: None) -> None:
