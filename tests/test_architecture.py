@@ -68,6 +68,7 @@ GPU = "relgym.program.gpu"
 ALONE = (("fcl", FCL), ("llvmlite", MACHINE), ("cupy", GPU))
 
 HEAVY = (
+    "cupy",
     "fcl",
     "llvmlite",
     "matplotlib",

@@ -79,7 +79,7 @@ class ModeClassifier:
     @property
     def waits(self) -> bool:
         """Whether there are pairs that wait to be learned anew."""
-        return bool(self._pairs) and any([pair.stale for pair in self._pairs.values()])
+        return any([pair.stale for pair in self._pairs.values()])
 
     @property
     def relations(self) -> frozenset[str]:

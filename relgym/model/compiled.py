@@ -6,8 +6,8 @@ import warnings
 from threading import Lock, Thread
 from typing import Final
 
-from relgym.errors import SlowWarning
-from relgym.program.gpu import Card
+from relgym.errors import ConfigError, SlowWarning
+from relgym.program.gpu import Card, CardError
 from relgym.program.machine import Machine, make
 from relgym.program.tape import Sizes
 
@@ -67,12 +67,15 @@ class Kernel:
 
         Raises
         ------
-        CardError
+        ConfigError
             There is none.
         """
         with self._turn:
             if self._card is None or not self._card.fits(sizes):
-                self._card = Card(sizes)
+                try:
+                    self._card = Card(sizes)
+                except CardError as error:
+                    raise ConfigError(f"device='cuda': {error}") from None
             return self._card
 
     def _make(self) -> None:

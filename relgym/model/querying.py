@@ -18,7 +18,6 @@ from relgym.model.calibration import (
     LINEAR,
     OWN,
     PERSISTENCE,
-    Assessment,
     Audit,
     Key,
     key_of,
@@ -40,7 +39,7 @@ from relgym.model.target.property_model import PropertyModel, Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Said", "derive", "predict", "predict_many", "settled", "worded"]
+__all__ = ["Said", "derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
@@ -117,9 +116,9 @@ def settled(
     lawful
         Whether laws say it (`Parts.governs`).
     """
-    target, mode = model.target, one.mode
+    target, mode, margin = model.target, one.mode, one.margin
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
-    key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, one.margin)
+    key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, margin)
     word = model.own_word(key) if values is None and math.isfinite(one.value) else None
     record: Audit | LateAudit
     if word is not None:  # what others would have said is asked if somebody looks back
@@ -132,23 +131,8 @@ def settled(
             values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
         told, claimed = model.verdict(key, values)
         value, record = values[told.speaker], Audit(key, values, told.speaker)
-    return worded(model, percept, index, following, one, told, claimed, value, record)
-
-
-def worded(
-    model: PropertyModel,
-    percept: Percept,
-    index: int,
-    following: NDArray[np.float64],
-    one: Prediction | Said,
-    told: Assessment,
-    claimed: bool,
-    value: float,
-    record: Audit | LateAudit,
-) -> Prediction:
-    """A prediction, once it is known who speaks, how right that is and whether it is claimed; arguments as there."""
-    speaker, probability, interval, spread = told
-    mode, roles, margin = one.mode, one.roles, one.margin
+    speaker, _, _, spread = told
+    roles = one.roles
     outcome = _outcome(one, speaker, claimed=claimed, known=bool(model.calibration.trials))
     if speaker == OWN:
         spread = one.spread
@@ -161,9 +145,19 @@ def worded(
     elif speaker == GUESS:
         best = model.fallback.guess_at(percept, index, following)
         spread = one.spread if best is None else best.mode.sigma
-    name, prop = percept.layout.names[index], model.target.property
     return Prediction(
-        name, prop, value, outcome, mode, roles, margin, one.frame, spread, probability, interval, record
+        percept.layout.names[index],
+        target.property,
+        value,
+        outcome,
+        mode,
+        roles,
+        margin,
+        one.frame,
+        spread,
+        told.probability,
+        told.interval,
+        record,
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.model.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key, key_of
+from relgym.model.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key
 from relgym.model.compiled import KERNEL
 from relgym.model.grounds import Grounds
 from relgym.model.lowering import lowered
@@ -34,7 +34,7 @@ from relgym.model.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.querying import Said, derive, settled, worded
+from relgym.model.querying import Said, derive, settled
 from relgym.model.regression import Regression
 from relgym.model.rolling import BatchRollout
 from relgym.model.scenes import scene_of, wrap
@@ -297,7 +297,7 @@ class Runner:
 
         Raises
         ------
-        CardError
+        ConfigError
             There is none.
         """
         if (settling := self._settles()) is None:
@@ -338,7 +338,7 @@ class Runner:
 
         Raises
         ------
-        CardError
+        ConfigError
             There is no card.
         """
         if (settling := self._settles()) is None:
@@ -403,19 +403,12 @@ class Runner:
         for k, teller in enumerate(self._tellers):
             a = teller.answer
             said = experts[k]
-            lawful, model = a.component >= 0, teller.model
             raw = teller.tell(numbers, said[OWN], outcomes[k], modes[k], margins[k], noted[k], players[k])
             if raw is None:
                 return None
-            if model.candidates:
-                one = settled(parts, model, percept, teller.index, following, raw, lawful=lawful)
-            else:
-                values, mode = (*said, numbers[a.column]), raw.mode
-                key = key_of(_PREDICTED if mode else outcomes[k], -mode if lawful else mode, margins[k])
-                word, claimed = model.verdict(key, values)
-                value = values[word.speaker]
-                record = Audit(key, values, word.speaker)
-                one = worded(model, percept, teller.index, following, raw, word, claimed, value, record)
+            model, lawful = teller.model, a.component >= 0
+            others = None if model.candidates else teller.values(said, numbers)
+            one = settled(parts, model, percept, teller.index, following, raw, others, lawful=lawful)
             following[a.column] = one.value
             found.append(one)
             same = one.value == after[a.column]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import copy
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, replace
 from functools import partial
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,6 @@ from relgym.model.target.hindsight import (
 )
 from relgym.model.target.property_model import PropertyModel
 from relgym.model.trusting import trusting
-from relgym.program.gpu import CardError
 from relgym.program.records import BeyondError
 from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
@@ -71,6 +70,8 @@ from relgym.scene.objects import ACTION, ObjectType, Scene, SceneLayout, Target,
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["LearnReport", "WorldModel", "with_action"]
+
+_TAKES_ARRAYS = "device='cuda': this model, or one of the scenes, takes arrays: device='cpu' has them"
 
 _OVERFLOWS = 1e30
 """Products of several numbers as large as this may be infinite."""
@@ -645,7 +646,11 @@ class WorldModel:
         """
         if _on_card(device):
             vectors = self._parts.checked_batch(layout, vectors)
-            return self._by_card(layout, len(vectors), partial(_predicted, vectors=vectors))
+            runner = self._runner(layout, len(vectors), on_card=True)
+            told = None if runner is None else runner.many(vectors, on_card=True)
+            if told is None:
+                raise ConfigError(_TAKES_ARRAYS)
+            return told
         if (found := self._run_many(layout, vectors)) is not None:
             return found
         vectors = self._parts.checked_batch(layout, vectors)
@@ -717,9 +722,9 @@ class WorldModel:
             Properties of the action object (physical units), shape ``(steps, n, properties)``; default: those of
             `vectors` throughout.
         device
-            ``"cuda"``: a thread of an Nvidia card for each scene. It takes seconds to compile the program the first
-            time, and pays from some 100,000 steps on. Values agree with the processor's to 1e-12 where bodies are
-            turned or sines are looked at, else to the bit.
+            ``"cuda"``: a thread of an Nvidia card for each scene, which takes some ten seconds to compile the first
+            time. Values agree with the processor's to 1e-12 where bodies are turned or sines are looked at, else to
+            the bit.
 
         Raises
         ------
@@ -744,34 +749,22 @@ class WorldModel:
                 raise ObservationError(f"actions: expected shape {wanted}, got {taken.shape}")
             if not np.isfinite(taken).all():
                 raise ObservationError("actions: some are NaN or infinite")
-        ask = partial(_rolled, vectors=vectors, steps=steps, actions=taken, first=first)
-        if on_card:
-            return self._by_card(layout, steps * len(vectors), ask)
-        runner = None if large(layout) else self._programs.of(self._parts, layout, steps * len(vectors))
-        found = None if runner is None else ask(runner)
+        runner = self._runner(layout, steps * len(vectors), on_card=on_card)
+        found = None if runner is None else runner.roll(vectors, steps, taken, first, on_card=on_card)
         if found is not None:
             return found
+        if on_card:
+            raise ConfigError(_TAKES_ARRAYS)
         return step_by_step(self.predict_batch, layout, vectors, taken, first)
 
-    def _by_card(self, layout: SceneLayout, scenes: int, ask: Callable[..., _Found | None]) -> _Found:
-        """What a graphics card says of so many scenes.
-
-        Raises
-        ------
-        ConfigError
-            It can't.
-        """
-        KERNEL.load()
-        runner = None if large(layout) else self._programs.of(self._parts, layout, max(scenes, PATIENCE))
-        try:
-            found = None if runner is None else ask(runner, on_card=True)
-        except CardError as error:
-            raise ConfigError(f"device='cuda': {error}") from None
-        if found is None:
-            raise ConfigError(
-                "device='cuda': this model, or one of the scenes, takes arrays: device='cpu' has them"
-            )
-        return found
+    def _runner(self, layout: SceneLayout, scenes: int, *, on_card: bool) -> Runner | None:
+        """What runs the program for a layout, of which so many scenes are asked; for a card whether it pays or not."""
+        if large(layout):
+            return None
+        if on_card:
+            KERNEL.load()
+            scenes = max(scenes, PATIENCE)
+        return self._programs.of(self._parts, layout, scenes)
 
     @refusing(ConfigError)
     def describe(
@@ -1069,27 +1062,8 @@ class WorldModel:
         return model
 
 
-_Found = TypeVar("_Found")
-
-
 def _on_card(device: Any) -> bool:
     """Whether a graphics card is asked."""
     if device not in ("cpu", "cuda"):
         raise ConfigError(f"device={device!r}: expected 'cpu' or 'cuda'")
     return bool(device == "cuda")
-
-
-def _predicted(runner: Runner, vectors: NDArray[np.float64], *, on_card: bool) -> BatchPrediction | None:
-    return runner.many(vectors, on_card=on_card)
-
-
-def _rolled(
-    runner: Runner,
-    vectors: NDArray[np.float64],
-    steps: int,
-    actions: NDArray[np.float64],
-    first: int,
-    *,
-    on_card: bool = False,
-) -> BatchRollout | None:
-    return runner.roll(vectors, steps, actions, first, on_card=on_card)

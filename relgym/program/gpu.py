@@ -29,7 +29,6 @@ OLDEST: Final = "sm_75"
 THREADS, GROUPS = 128, 16
 """Threads of a group, and groups for each multiprocessor at most: hardly any steps a second depend on them."""
 
-
 MANY: Final = 1 << 20
 """Scenes that lie on a card at once, at most: a million of 65 numbers are 0.5 GB, and as many next ones."""
 
@@ -41,6 +40,11 @@ class CardError(Exception):
 def roomy(sizes: Sizes) -> Sizes:
     """Sizes of a work space for programs of about the same size: powers of two."""
     return Sizes(*(1 << max(size - 1, 0).bit_length() for size in sizes))
+
+
+def own_space(sizes: Sizes) -> np.dtype[np.void]:
+    """Where a thread works on a scene: a space without a tape, and without memory of other scenes."""
+    return space_of(sizes._replace(code=1, numbers=1, remembered=1))
 
 
 def variant(sizes: Sizes, address_space: int) -> Variant:
@@ -58,23 +62,19 @@ def variant(sizes: Sizes, address_space: int) -> Variant:
 
 def text(sizes: Sizes, address_space: int) -> str:
     """LLVM's assembly of the kernel in a work space of some sizes, with the tape in global variables."""
-    space = space_of(sizes._replace(code=1, numbers=1, remembered=1))
     place = f"addrspace({address_space}) " if address_space else ""
     tape = (
         f"@relgym_code = {place}externally_initialized global [{sizes.code} x i64] zeroinitializer, align 16\n"
         f"@relgym_numbers = {place}externally_initialized global [{sizes.numbers} x double] zeroinitializer, align 16\n"
     )
     needed = {name: entry for name, entry in entries().items() if name != SEE}
-    return tape + assembly(needed, space, variant(sizes, address_space))
+    return tape + assembly(needed, own_space(sizes), variant(sizes, address_space))
 
 
 def ptx(sizes: Sizes, processor: str = OLDEST) -> str:
     """The kernel in the language of Nvidia's cards."""
-    size = space_of(sizes._replace(code=1, numbers=1, remembered=1)).itemsize
-    return optimized(
-        f'target triple = "nvptx64-nvidia-cuda"\n{text(sizes, 1)}\n{_THREADS.format(size=size)}',
-        processor,
-    )
+    threads = _THREADS.format(size=own_space(sizes).itemsize)
+    return optimized(f'target triple = "nvptx64-nvidia-cuda"\n{text(sizes, 1)}\n{threads}', processor)
 
 
 _THREAD: Final = """
@@ -196,11 +196,10 @@ class Card:
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """As `relgym.program.machine.Machine.roll`, of the two arrays of a tape."""
         self._lay(tape)
-        parts = [
-            self._rolled(vectors[k : k + MANY], steps, actions[:, k : k + MANY], first, settling)
-            for k in range(0, max(len(vectors), 1), MANY)
+        found = [
+            self._rolled(vectors[p], steps, actions[:, p], first, settling) for p in self._parts(len(vectors))
         ]
-        return np.concatenate([after for after, _ in parts]), np.concatenate([lasted for _, lasted in parts])
+        return np.concatenate([after for after, _ in found]), np.concatenate([lasted for _, lasted in found])
 
     def _rolled(
         self,
@@ -227,9 +226,22 @@ class Card:
         settling: bool,
     ) -> int:
         """As `relgym.program.machine.Machine.run`, of the two arrays of a tape."""
-        n, cupy = len(vectors), self._cupy
         outcomes, modes, margins, sure = told
         self._lay(tape)
+        return max(
+            self._ran(vectors[p], following[p], (outcomes[p], modes[p], margins[p], sure[:, p]), settling)
+            for p in self._parts(len(vectors))
+        )
+
+    def _ran(
+        self,
+        vectors: NDArray[np.float64],
+        following: NDArray[np.float64],
+        told: tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]],
+        settling: bool,
+    ) -> int:
+        n, cupy = len(vectors), self._cupy
+        outcomes, modes, margins, sure = told
         now, answers = cupy.asarray(vectors), outcomes.shape[1]
         places = [cupy.empty(each.shape, each.dtype) for each in (following, outcomes, modes, margins)]
         known, wrong = cupy.empty((n, 2, answers)), cupy.empty(n, dtype=np.int64)
@@ -245,6 +257,10 @@ class Card:
         for place, part in zip((self._code, self._numbers), tape, strict=True):
             place[: len(part)].set(part)
 
+    def _parts(self, n: int) -> list[slice]:
+        """Scenes that lie on the card together, one part after the other."""
+        return [slice(k, k + MANY) for k in range(0, max(n, 1), MANY)]
+
     def _grid(self, n: int) -> tuple[int]:
         return (max(1, min(-(-n // THREADS), self._most)),)
 
@@ -253,12 +269,12 @@ def _library() -> Any:
     """CuPy, if there is a card that it can use."""
     try:
         import cupy
-
-        cupy.cuda.Device().use()
     except ImportError as error:
         raise CardError(
             f"{error}: pip install cupy-cuda13x, or the one for your driver's version of CUDA"
         ) from None
-    except Exception as error:  # each of the driver's errors is a class of its own
+    try:
+        cupy.cuda.Device().use()
+    except (cupy.cuda.runtime.CUDARuntimeError, cupy.cuda.driver.CUDADriverError) as error:
         raise CardError(f"no card that can be used: {error}") from None
     return cupy

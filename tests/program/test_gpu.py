@@ -18,7 +18,7 @@ from relgym.model.world_model import WorldModel
 from relgym.program import gpu
 from relgym.program.gpu import Card, CardError, ptx, roomy
 from relgym.program.machine import _optimized, _target
-from relgym.program.tape import Sizes, space_of
+from relgym.program.tape import Sizes
 from relgym.scene.objects import ACTION
 
 
@@ -42,7 +42,7 @@ class Imitation(Card):
         module, target = _optimized(gpu.text(self.sizes, 0), _target())
         self._engine = llvm.create_mcjit_compiler(module, target)
         self._engine.finalize_object()
-        self._space = np.zeros(1, space_of(self.sizes._replace(code=1, numbers=1, remembered=1)))
+        self._space = np.zeros(1, gpu.own_space(self.sizes))
 
     def call(self, name: str, *arguments: Any) -> int:
         kinds = [ctypes.c_int64 if isinstance(a, int | np.integer) else ctypes.c_void_p for a in arguments]
@@ -65,8 +65,7 @@ class Imitation(Card):
             self.call("relgym_roll", self._space, *numbers, taken, vectors[i], after[i], lasted[i:])
         return after, lasted
 
-    def run(self, tape: Any, vectors: Any, following: Any, told: Any, *, settling: bool) -> int:
-        self._lay(tape)
+    def _ran(self, vectors: Any, following: Any, told: Any, settling: bool) -> int:
         outcomes, modes, margins, sure = told
         known, wrong = np.empty((len(vectors), 2, outcomes.shape[1])), 0
         for i in range(len(vectors)):
@@ -125,6 +124,10 @@ def test_scenes_go_there_a_part_at_a_time(imitated: None, monkeypatch: pytest.Mo
     assert whole is not None and parts is not None
     np.testing.assert_array_equal(parts.vectors, whole.vectors)
     np.testing.assert_array_equal(parts.lasted, whole.lasted)
+    said, known = asked.many(vectors, on_card=True), asked.many(vectors)
+    assert said is not None and known is not None
+    np.testing.assert_array_equal(said.vectors, known.vectors)
+    np.testing.assert_array_equal(said.outcomes, known.outcomes)
     nobody = asked.roll(vectors[:0], 5, actions[:, :0], where.start, on_card=True)
     assert nobody is not None and nobody.vectors.shape == (0, vectors.shape[1])
 

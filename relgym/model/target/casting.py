@@ -67,7 +67,7 @@ class Casting:
     @property
     def waits(self) -> bool:
         """Whether there are descriptions that wait to be learned anew."""
-        return bool(self.classifiers) and any([known.stale for known in self.classifiers.values()])
+        return any([known.stale for known in self.classifiers.values()])
 
     def observe(self, mode: Mode, example: Example, roles: Sequence[int], weight: float = 1.0) -> bool:
         """Learn from the role binding of one example, which stands for so many.

@@ -240,12 +240,10 @@ class PropertyModel:
         """How much a prediction teaches that came out as such ones do."""
         if self.undecided:
             return Standing.OPEN
-        population = self.clusterer.population
-        if (
-            population.approximate or self._unsettled or self.fallback.guessable
-        ):  # what is decided is rough then
+        c = self.clusterer
+        if c.approximate or self.rough:
             return Standing.COARSE
-        if population.chancy or self.clusterer.waits or self.classifier.waits or self.casting.waits:
+        if c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
             return Standing.OPEN
         return Standing.SETTLED
 
@@ -472,9 +470,8 @@ class PropertyModel:
 
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
         """Who gives the value of a prediction, how right it will be, and whether it is claimed."""
-        abstains = self.config.abstain
-        known = (self.calibration if abstains else _NOTHING).verdict(key, values)
-        return (known[0], False) if self.surmise and abstains else known
+        known = self.record.verdict(key, values)
+        return (known[0], False) if self.surmise and self.config.abstain else known
 
     def own_word(self, key: Key) -> Assessment | None:
         """How right a prediction will be whose winner has the word whatever others say; None where that depends."""
