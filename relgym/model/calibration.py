@@ -2,8 +2,8 @@
 
 Several experts have a value for what comes next: the mode or law that won, the guess, regressions on everything, and
 that nothing changes. A learner that predicts before each step reports how each of them came out
-(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up; in those
-of its winner where there are few trials. Of a cell
+(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up, or of an
+approximation how far from what it was made of it is asked; in those of its winner where there are few trials. Of a cell
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
   `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
@@ -21,8 +21,9 @@ it had none yet, all cells together tell whether it speaks.
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
 `ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
-from the records of those who speak now: what slipped before a law was known isn't held against the law. Of a model that
-was never told how its predictions came out nothing is known, and nothing is doubted.
+from the records of those who speak now: what slipped before a law was known isn't held against the law. An approximation
+isn't claimed further out than it was asked and right, however right it is near: a misfit grows. Of a model that was
+never told how its predictions came out nothing is known, and nothing is doubted.
 """
 
 from __future__ import annotations
@@ -38,7 +39,18 @@ from numpy.typing import NDArray
 
 from relgym.config.constants import EVIDENCE, SUMMABLE
 
-__all__ = ["EXPERTS", "Assessment", "Audit", "Calibration", "Key", "key_of", "keys_of", "lead_bins"]
+__all__ = [
+    "EXPERTS",
+    "Assessment",
+    "Audit",
+    "Calibration",
+    "Key",
+    "far_bin",
+    "far_bins",
+    "key_of",
+    "keys_of",
+    "lead_bins",
+]
 
 EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
 """Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
@@ -88,6 +100,10 @@ _EXACT: Final = -(1 << 14)
 NO_RUNNER_UP: Final = 7
 """Bin of leads where there is nobody to lead."""
 
+FAR: Final = range(NO_RUNNER_UP, NO_RUNNER_UP + NO_RUNNER_UP)[1:]
+"""Bins of leads of approximations that are asked far from what they were made of, as many as of leads: octaves of the
+squared distance (`relgym.model.regression.Regressed`), with which a misfit grows."""
+
 OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
 """Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
 
@@ -130,8 +146,10 @@ class Assessment(NamedTuple):
 
 
 @lru_cache
-def key_of(outcome: int, winner: int, margin: float) -> Key:
-    """The cell of a prediction; most margins come again and again."""
+def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
+    """The cell of a prediction; most margins come again and again. `far`: see `far_bin`."""
+    if far:
+        return Key(outcome, winner, far)
     if not margin > 0.0:
         return Key(outcome, winner, 0)
     if math.isinf(margin):
@@ -139,14 +157,33 @@ def key_of(outcome: int, winner: int, margin: float) -> Key:
     return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), NO_RUNNER_UP - 1))
 
 
+def far_bin(distance: float) -> int:
+    """The bin of a squared distance (`FAR`); 0: it is less than twice that of most."""
+    if not distance >= 2.0:
+        return 0
+    return FAR[-1] if math.isinf(distance) else min(NO_RUNNER_UP - 1 + math.frexp(distance)[1], FAR[-1])
+
+
+def far_bins(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+    """`far_bin` of n squared distances."""
+    _, exponents = np.frexp(np.where(np.isfinite(distances), distances, 1.0))
+    found = np.where(distances >= 2.0, np.minimum(NO_RUNNER_UP - 1 + exponents, FAR[-1]), 0)
+    return np.where(np.isposinf(distances), FAR[-1], found).astype(np.int64)
+
+
 def keys_of(
-    outcomes: NDArray[np.int8], winners: NDArray[np.int64], margins: NDArray[np.float64]
+    outcomes: NDArray[np.int8],
+    winners: NDArray[np.int64],
+    margins: NDArray[np.float64],
+    far: NDArray[np.int64] | None = None,
 ) -> Iterator[tuple[Key, NDArray[np.intp]]]:
-    """The cells of n predictions, and which of them lie in each."""
-    for rows in _groups((winners << 10) + (outcomes.astype(np.int64) << 3) + lead_bins(margins)):
+    """The cells of n predictions, and which of them lie in each; `far`: see `far_bins`."""
+    leads = lead_bins(margins)
+    if far is not None:
+        leads = np.where(far > 0, far, leads)
+    for rows in _groups((winners << 10) + (outcomes.astype(np.int64) << 4) + leads):
         first = rows[0]
-        (lead,) = lead_bins(margins[first : first + 1]).tolist()
-        yield Key(int(outcomes[first]), int(winners[first]), lead), rows
+        yield Key(int(outcomes[first]), int(winners[first]), int(leads[first])), rows
 
 
 def _groups(codes: NDArray[np.int64]) -> Iterator[NDArray[np.intp]]:
@@ -474,7 +511,9 @@ class Calibration:
         for rows in _groups(able @ (1 << np.arange(values.shape[1]))):
             yield rows, self.assess(key, np.where(able[rows[0]], 0.0, np.nan).tolist())
 
-    def table(self, outcomes: int, able: Sequence[int]) -> Iterator[tuple[Key, int, Assessment, bool]]:
+    def table(
+        self, outcomes: int, able: Sequence[int], *, distant: bool = False
+    ) -> Iterator[tuple[Key, int, Assessment, bool]]:
         """What is made of every kind of predictions: a table that says of any prediction what `assess` and `claims` do.
 
         A prediction whose cell isn't listed is of the kind of its winner (a lead of `OF_WINNER`); one whose winner
@@ -486,6 +525,8 @@ class Calibration:
             Numbers of outcomes are smaller than this.
         able
             Experts who may have a value, as bits by their places in `EXPERTS`, set by set; persistence always has one.
+        distant
+            Whether kinds far from what was learned are asked for (`far_bin`): all there may be of every winner.
 
         Yields
         ------
@@ -495,7 +536,11 @@ class Calibration:
         families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
         rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] << 40, nowhere)) for each in families]
         rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
-        rows += [(k, k) for k in sorted(self._cells) if k.lead >= 0]
+        kinds = {k for k in self._cells if k.lead >= 0}
+        if distant:
+            of = [k for k in self._cells if k.lead == OF_WINNER and k.winner > 0]
+            kinds |= {k._replace(lead=far) for k in of for far in FAR}
+        rows += [(k, k) for k in sorted(kinds)]
         for shown, key in rows:
             for bits in able:
                 having = tuple(k for k in range(len(EXPERTS)) if bits >> k & 1 or k == PERSISTENCE)
@@ -503,6 +548,8 @@ class Calibration:
                 yield shown, bits, told, self.claims(key, told)
 
     def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        if self._far_out(key) and key not in self._cells:
+            return self._further(key, able)
         family, winner, cell = (self._cells.get(each) for each in _levels(key))
         family = family if key.winner else None
         bits = self._bits(_who(key))
@@ -535,6 +582,18 @@ class Calibration:
         half = math.nan if record is None or few else _quantile(record.errors, COVERED)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _far_out(self, key: Key) -> bool:
+        """Whether an approximation that was asked before is asked far from what it was made of."""
+        return key.lead in FAR and _winner(key) in self._cells
+
+    def _further(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        """What is made of an approximation further than it was ever asked: who spoke nearer does, no surer than not."""
+        nearer = key
+        while nearer.lead in FAR and nearer not in self._cells:
+            nearer = nearer._replace(lead=nearer.lead - 1)
+        told = self._assess(nearer, able)
+        return told._replace(probability=min(told.probability, 0.5))
 
     def _unheard(self, cell: _Cell, speaker: int, able: tuple[int, ...]) -> int | None:
         """Who was never heard in a cell, but elsewhere codes best by enough; None: nobody, or a mode or law speaks."""
@@ -582,6 +641,8 @@ class Calibration:
     def _claims(self, key: Key, told: Assessment) -> bool:
         """`claims` of what somebody looked back at, worked out once between changes."""
         who, cell = _who(key), self._cells.get(key)
+        if self._far_out(key) and (cell is None or cell.squares[PERSISTENCE][0] < FEW):
+            return False  # too few have shown what an approximation is worth there
         if who not in self._least:
             self._least[who] = self._needed(who)
         like = [cell] if cell is not None else self._alike(key)

@@ -17,7 +17,7 @@ from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.chaining import Inquiry, Look, in_order
 from relgym.model.motion import Laws, possible_targets
 from relgym.model.perception import Percept, Perception
-from relgym.model.regression import Regression
+from relgym.model.regression import Regressed, Regression
 from relgym.model.scenes import MOST_LAYOUTS, TURN, mismatch, next_values, passage
 from relgym.model.screening import Screen
 from relgym.model.target.property_model import PropertyModel
@@ -344,13 +344,27 @@ class Parts:
         regression = self.regressions[percept.layout.types[index].name]
         if prop not in regression.targets:
             return None
+        found = self._asked(regression, percept, index)
+        return None if found is None else found.changes[:, :, regression.targets.index(prop)]
+
+    def distance(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
+        """How far n scenes of an object lie from what regressions of a property learned, shape ``(n,)``; None: no such.
+
+        Squared, and about 1 in the mean of what was learned (`Regression.values`).
+        """
+        regression = self.regressions[percept.layout.types[index].name]
+        found = self._asked(regression, percept, index) if prop in regression.targets else None
+        return None if found is None else found.distances
+
+    def _asked(self, regression: Regression, percept: Percept, index: int) -> Regressed | None:
+        """What regressions say of an object of n scenes; asked once for all properties."""
         known = percept.regressed.get(index)
         if known is None or known[0] != regression.seen:
             signature = percept.situation(index).signature
             # Only present values are read, and of objects alone of their type: their order doesn't matter.
             x = percept.rows(index, percept.vectors, ordered=False)
             known = percept.regressed[index] = (regression.seen, regression.values(signature, x))
-        return None if known[1] is None else known[1][:, :, regression.targets.index(prop)]
+        return known[1]
 
     def governs(self, target: Target) -> bool:
         """Whether laws of motion, not modes, predict a target."""

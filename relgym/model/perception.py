@@ -15,6 +15,7 @@ from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
 from relgym.model.compiled import KERNEL
 from relgym.model.grouping import distinct
+from relgym.model.regression import Regressed
 from relgym.model.sight import Seen, Sight
 from relgym.program.records import BeyondError
 from relgym.scene.context import order_and_ties, slots, state_keys
@@ -350,7 +351,7 @@ class Percept:
     vectors: NDArray[np.float64]
     _relations: Relations | None = None
     _situations: dict[int, Situation] = field(default_factory=dict)
-    regressed: dict[int, tuple[int, NDArray[np.float64] | None]] = field(default_factory=dict)
+    regressed: dict[int, tuple[int, Regressed | None]] = field(default_factory=dict)
 
     @property
     def relations(self) -> Relations:

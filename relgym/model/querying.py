@@ -20,6 +20,8 @@ from relgym.model.calibration import (
     PERSISTENCE,
     Audit,
     Key,
+    far_bin,
+    far_bins,
     key_of,
     keys_of,
 )
@@ -98,6 +100,7 @@ def settled(
     following: NDArray[np.float64],
     one: Prediction | Said,
     values: tuple[float, ...] | None = None,
+    far: int | None = None,
     *,
     lawful: bool,
 ) -> Prediction:
@@ -113,12 +116,18 @@ def settled(
         What modes or laws say; its value is NaN where they say nothing.
     values
         What all experts say, if that is known already.
+    far
+        The bin of how far the scene lies from what was learned (`far_bin`), where that counts, if it is known already.
     lawful
         Whether laws say it (`Parts.governs`).
     """
     target, mode, margin = model.target, one.mode, one.margin
     # Whether a target counts as undecided or not, what won its vote is as right as it is.
-    key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, margin)
+    if far is None:
+        asks = mode != 0 and not lawful and model.tells_how_far
+        away = parts.distance(percept, index, target.property) if asks else None
+        far = 0 if away is None else far_bin(float(away[0]))
+    key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, margin, far)
     word = model.own_word(key) if values is None and math.isfinite(one.value) else None
     record: Audit | LateAudit
     if word is not None:  # what others would have said is asked if somebody looks back
@@ -311,7 +320,10 @@ def _settled_many(
     values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))
     winners = -verdict.modes if parts.governs(target) else verdict.modes
     outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
-    for key, part in keys_of(outcomes, winners, verdict.margins):
+    asks = model.tells_how_far and not parts.governs(target)
+    away = parts.distance(percept, index, target.property) if asks else None
+    far = None if away is None else np.where(verdict.modes != 0, far_bins(away), 0)
+    for key, part in keys_of(outcomes, winners, verdict.margins, far):
         for rows, told in model.assess_many(key, said[part]):
             some = part[rows]
             values[some] = said[some, told.speaker]

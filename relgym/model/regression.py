@@ -18,7 +18,7 @@ from __future__ import annotations
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,30 @@ from relgym.config.constants import BEYOND, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
 from relgym.scene.objects import TASK
 
-__all__ = ["KINDS", "Regression"]
+__all__ = ["KINDS", "Regressed", "Regression"]
 
 KINDS = 2
 """Linear; and what all together say, squares and products too, as far as the leverage allows."""
 
 FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
+
+
+class Regressed(NamedTuple):
+    """What regressions say of some rows.
+
+    Attributes
+    ----------
+    changes
+        Predicted changes, shape ``(n, KINDS, targets)``: NaN where a regression isn't made, never far beyond the
+        changes that were seen.
+    distances
+        How far the rows lie from those that were learned, shape ``(n,)``: h n / d, a squared distance that is about 1
+        in the mean of those.
+    """
+
+    changes: NDArray[np.float64]
+    distances: NDArray[np.float64]
 
 
 class Regression:
@@ -140,11 +157,8 @@ class Regression:
             found.append(np.concatenate([z, z[:, first] * z[:, second]], axis=1))
         return found
 
-    def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Changes predicted of rows ``(n, width)``, shape ``(n, KINDS, targets)``; None while there is nothing.
-
-        NaN where a regression isn't made; never far beyond the changes that were seen.
-        """
+    def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> Regressed | None:
+        """What they say of rows ``(n, width)``; None while there is nothing."""
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
         found, leverage = self._said(x[:, places])
@@ -155,7 +169,9 @@ class Regression:
                 np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole
             )
         found[:, 1] = np.where(np.isfinite(found[:, 0]), whole, np.nan)
-        return found
+        first = self._ridges[0]
+        with np.errstate(over="ignore"):
+            return Regressed(found, leverage[:, 0] / min(1.0, first.columns * (1.0 / max(first.rows, 1))))
 
     def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and leverages, ``(n, KINDS)``."""

@@ -194,6 +194,8 @@ class _Told(NamedTuple):
     """Number and place of each answer's belief; empty unless it is settled."""
     experts: list[list[float]]
     """What everybody but persistence says of each answer (`relgym.model.calibration.EXPERTS`)."""
+    far: list[int]
+    """The bin of how far the scene lies from what regressions of each answer learned."""
 
 
 class Runner:
@@ -217,7 +219,7 @@ class Runner:
         tape = encoded(program)
         self._space, count = tape.space(), len(program.answers)
         self._now, self._after = np.empty(program.width), np.empty(program.width)
-        told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed", "experts")
+        told = ("outcomes", "modes", "margins", "touched", "players", "sure", "believed", "experts", "far")
         self._tells = tuple(
             self._space[name][0, :count] for name in told
         )  # where the kernel leaves what it says
@@ -399,7 +401,7 @@ class Runner:
             return None
         following, own, parts = now.copy(), True, self._parts
         found: list[Prediction] = []
-        after, outcomes, modes, margins, noted, players, _, _, experts = told
+        after, outcomes, modes, margins, noted, players, _, _, experts, far = told
         for k, teller in enumerate(self._tellers):
             a = teller.answer
             said = experts[k]
@@ -408,7 +410,8 @@ class Runner:
                 return None
             model, lawful = teller.model, a.component >= 0
             others = None if model.candidates else teller.values(said, numbers)
-            one = settled(parts, model, percept, teller.index, following, raw, others, lawful=lawful)
+            away = far[k] if raw.mode and not lawful and model.tells_how_far else 0
+            one = settled(parts, model, percept, teller.index, following, raw, others, away, lawful=lawful)
             following[a.column] = one.value
             found.append(one)
             same = one.value == after[a.column]
@@ -419,7 +422,7 @@ class Runner:
                 told = self._told(now, settling=False, given=given)
                 if told is None:
                     return None
-                after, outcomes, modes, margins, noted, players, _, _, experts = told
+                after, outcomes, modes, margins, noted, players, _, _, experts, far = told
         if own:
             following = after
         else:
@@ -438,7 +441,7 @@ class Runner:
         told = self._told(now, settling=True)
         if told is None:
             return None
-        after, rows = told.following, zip(self._tellers, *told[1:], strict=True)
+        after, rows = told.following, zip(self._tellers, *told[1:-1], strict=True)
         numbers: list[float] = now.tolist()
         found: list[Prediction] = []
         kinds = self._kinds
@@ -501,7 +504,7 @@ class Runner:
                 self._given[list(given)] = 0
             if bad:
                 return None
-            outcomes, modes, margins, noted, players, sure, believed, experts = self._tells
+            outcomes, modes, margins, noted, players, sure, believed, experts, far = self._tells
             return _Told(
                 self._after.copy(),
                 outcomes.tolist(),
@@ -512,6 +515,7 @@ class Runner:
                 sure.tolist() if settling else [],
                 believed.tolist() if settling else [],
                 experts.tolist(),
+                far.tolist(),
             )
 
 

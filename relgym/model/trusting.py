@@ -48,7 +48,8 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))
-        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest)))
+        distant = model.tells_how_far and a.regression is not None
+        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, distant)))
     return replace(program, answers=tuple(answers))
 
 
@@ -57,7 +58,7 @@ def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
     some = [bits for bits in range(able + 1) if bits & ~able == 0]
     return [
         ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed, told.spread)
-        for key, bits, told, claimed in model.record.table(KINDS, some)
+        for key, bits, told, claimed in model.record.table(KINDS, some, distant=model.tells_how_far)
     ]
 
 

@@ -1617,6 +1617,16 @@ def lead_of(margin):
     return found
 
 
+def far_bin(distance):
+    """The bin of how far a scene lies from what regressions know (`relgym.model.calibration.far_bin`)."""
+    if not distance >= 2.0:
+        return 0
+    found, most = 8, 4.0
+    while found < 13 and distance >= most:
+        found, most = found + 1, 2.0 * most
+    return found
+
+
 def find(s, at, count, wanted):
     """The place of a number among ascending ones; -1: it isn't there."""
     low, high = np.int64(0), count
@@ -1681,6 +1691,8 @@ def regress(s, record, k):
             more = growth * far if growth > 0.0 else 0.0
             share = bias / (bias + more) if bias > 0.0 else 0.0
             whole = whole + share * (word - whole)
+    midst = s.numbers[reach + 4]
+    s.far[k] = far_bin((s.leverage[0] + midst) / min(1.0, s.code[fit] * midst))
     s.experts[k, LINEAR] = present + linear
     s.experts[k, PRODUCTS] = present + whole if math.isfinite(linear) else math.nan
 
@@ -1691,6 +1703,7 @@ def consult(s, a, k, value):
     said[OWN] = value
     said[GUESS] = guessed(s, a) if s.code[a + 16] or s.code[a + 17] else math.nan
     said[LINEAR] = said[PRODUCTS] = math.nan
+    s.far[k] = 0
     if s.code[a + 26]:
         regress(s, s.code[a + 26], k)
     said[LATEST] = total(s, s.code[s.code[a + 27] + 2]) if s.code[a + 27] else math.nan
@@ -1708,7 +1721,10 @@ def settled(s, a, k, value, outcome, mode, margin, able):
     trust = s.code[a + 25]
     winner = -mode if s.code[trust + 4] else mode
     kind = np.int64(PREDICTED if mode else outcome)
-    number = ((winner * 16 + lead_of(margin) + 2) * 8 + kind) * 32 + able
+    lead = s.far[k] if mode and s.code[trust + 5] else np.int64(0)
+    if lead == 0:
+        lead = np.int64(lead_of(margin))
+    number = ((winner * 16 + lead + 2) * 8 + kind) * 32 + able
     if s.believed[k, 0] != number:
         place = find(s, s.code[trust + 1], s.code[trust], number)
         if place < 0:  # all of the winner

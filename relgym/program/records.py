@@ -586,11 +586,14 @@ class Trust:
         Whether winners are laws.
     latest
         The mode that held last; 0 where nobody asks it.
+    distant
+        Whether kinds of what modes say far from what was learned have the bin of that instead of a lead.
     """
 
     beliefs: tuple[Belief, ...]
     lawful: bool
     latest: int
+    distant: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -570,8 +570,12 @@ class _Source:
             name = self._called(number)
             latest = f"({trust.latest}, {name}_mode_{trust.latest})" if trust.latest else "None"
             squares = self._regression(name, a.regression) if a.regression is not None else "None"
-            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {trust.lawful}, {latest}, {squares})")
-        add("# beliefs, whether of laws, the mode that held last, regressions; of each answer below")
+            kind = f"{trust.lawful}, {trust.distant}"
+            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind}, {latest}, {squares})")
+        add(
+            "# beliefs; whether of laws, and by how far a scene lies from what was learned; the mode that held last;"
+        )
+        add("# regressions; of each answer below")
         add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
 
     def _fit(self, number: int, fit: ir.Fit) -> None:
@@ -797,16 +801,18 @@ def settled(number, value, outcome, mode, margin, guess, x):
     """Value, outcome and mode of a prediction, once it is known how right such ones were, and how sure that is."""
     if TRUST[number] is None:
         return value if math.isfinite(value) else guess, outcome, mode, (math.nan, math.nan)
-    beliefs, lawful, latest, squares = TRUST[number]
+    beliefs, lawful, distant, latest, squares = TRUST[number]
     present = x[NEXT + ANSWERS[number][1]]
     last = latest[1](x) if latest else math.nan
-    linear, products = regressed(x, *squares) if squares else (math.nan, math.nan)
+    linear, products, far = regressed(x, *squares) if squares else (math.nan, math.nan, 0.0)
     values = value, guess, linear, products, last, present
     able = sum(1 << k for k, each in enumerate(values[:5]) if math.isfinite(each))
     winner = -mode if lawful else mode
     lead = 0
     if margin > 0.0:
         lead = 7 if margin == math.inf else min(max(math.frexp(margin)[1] + 2, 1), 6)
+    if distant and mode and far >= 2.0:  # of an approximation, further than most of what it was made of
+        lead = 13 if far == math.inf else min(6 + math.frexp(far)[1], 13)
     kind = PREDICTED if mode else outcome
     known = beliefs.get((kind, winner, lead, able)) or beliefs.get((kind, winner, -1, able))
     known = known or beliefs[kind, (winner > 0) - (winner < 0), -2, able]
@@ -842,7 +848,7 @@ def in_order(terms):
 def regressed(x, present, fit, weights, least, most, trusted):
     """The next value by least squares on some numbers, and what that and least squares on their products say together.
 
-    Each counts as far as the leverage allows.
+    Each counts as far as the leverage allows. And the squared distance from what was learned, 1 in the mean.
     """
     columns, reach = fit
     z = [(x[c] - centre) / scale for c, centre, scale in columns]
@@ -850,17 +856,20 @@ def regressed(x, present, fit, weights, least, most, trusted):
     with np.errstate(over="ignore", invalid="ignore"):
         words = [in_order(np.array([1.0, *shown]) * np.array(row)) for shown, row in zip(both, weights)]
     words = [min(max(word, least), most) if word == word else word for word in words]
-    whole = 0.0
+    whole, distance = 0.0, math.nan
     for word, shown, (mean, text), (bias, growth, midst) in zip(words, both, reach, trusted):
         off = np.array(shown) - np.array(mean)
         with np.errstate(over="ignore", invalid="ignore"):
             far = in_order(off * np.add.accumulate(spread(text, len(mean)) * off[:, None])[-1])
         h = (far if far >= 0.0 else math.inf) + midst
+        if distance != distance:
+            distance = h / min(1.0, len(mean) * midst)
         more = growth * h if growth > 0.0 else 0.0
         share = bias / (bias + more) if bias > 0.0 else 0.0
         if math.isfinite(word):
             whole = whole + share * (word - whole)
-    return x[present] + words[0], x[present] + whole if math.isfinite(words[0]) else math.nan
+    products = x[present] + whole if math.isfinite(words[0]) else math.nan
+    return x[present] + words[0], products, distance
 
 '''
 

@@ -155,6 +155,7 @@ def space_of(most: Sizes) -> np.dtype[np.void]:
         ("fitted", np.int64, (1,)),  # what regressions look at lies in `shown`; 0: nothing does
         ("shown", np.float64, (2, most.shown)),  # that, and how far from what they know
         ("leverage", np.float64, (2,)),  # of both regressions there
+        ("far", np.int64, (answers,)),  # the bin of how far that is from what was learned
         ("state", np.uint64, (1,)),  # all relations that are known, as a number
         ("memory_keys", np.uint64, (most.remembered,)),
         ("memory", np.int64, (most.remembered, 2 + REMEMBERED_MODES * (2 + REMEMBERED_ROLES))),
@@ -576,7 +577,7 @@ class _Writer:
         kinds = self.put(*map(_kind, some))
         said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
         at = self.num(*(v for each in some for v in (each.probability, each.interval)))
-        return self.put(len(some), kinds, said, at, trust.lawful)
+        return self.put(len(some), kinds, said, at, trust.lawful, trust.distant)
 
     def _fit(self, fit: ir.Fit) -> int:
         """How many columns, which, their centres and scales; then of each regression where its leverage is told.

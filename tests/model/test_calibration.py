@@ -38,6 +38,8 @@ from relgym.model.calibration import (
     _place,
     _quantile,
     _Record,
+    far_bin,
+    far_bins,
     key_of,
     keys_of,
     lead_bins,
@@ -968,22 +970,25 @@ def calibrations(draw: st.DrawFn) -> tuple[Calibration, int]:
         said = sizes[lead] * rng.normal(size=len(EXPERTS))
         said[~having | (rng.random(len(EXPERTS)) < 0.2)] = math.nan
         said[PERSISTENCE] = 1.0
-        key = Key(int(rng.integers(2)), winner, 7 if winner < 0 else lead)
+        far = 8 + lead if winner > 0 and rng.random() < 0.3 else lead
+        key = Key(int(rng.integers(2)), winner, 7 if winner < 0 else far)
         seen(known, tuple(said.tolist()), 0.0, key=key)
     return known, able
 
 
 @settings(max_examples=40)
-@given(calibrations())
-def test_the_table_says_what_assess_and_claims_say(made: tuple[Calibration, int]) -> None:
+@given(calibrations(), st.booleans())
+def test_the_table_says_what_assess_and_claims_say(made: tuple[Calibration, int], distant: bool) -> None:
     """As kernels read it: a cell, else its winner's, else its family's."""
     known, able = made
     sets = [bits for bits in range(able + 1) if bits & ~able == 0]
-    rows = {(key, bits): (told, sure) for key, bits, told, sure in known.table(3, sets)}
-    assert len(rows) == len(list(known.table(3, sets)))  # nothing is listed twice
+    listed = list(known.table(3, sets, distant=distant))
+    rows = {(key, bits): (told, sure) for key, bits, told, sure in listed}
+    assert len(rows) == len(listed)  # nothing is listed twice
     for outcome in range(3):
         for winner in range(-3, 4):
-            for lead in (0, 1, 2, 3, 5, 7):
+            far = range(8, 14) if distant and winner > 0 else ()
+            for lead in (0, 1, 2, 3, 5, 7, *far):
                 key = Key(outcome, winner, lead)
                 who = (winner > 0) - (winner < 0)
                 chain = (key, key._replace(lead=OF_WINNER), Key(outcome, who, OF_FAMILY))
@@ -1041,15 +1046,12 @@ WINNERS = st.integers(-3, 3) | st.sampled_from([2**31 - 1, -(2**31)])
 MARGINS = st.sampled_from([0.0, 0.1, 1.0, 9.0, math.inf])
 
 
-@given(st.lists(st.tuples(st.integers(0, 7), WINNERS, MARGINS), max_size=20))
-def test_each_prediction_lies_in_one_cell_its_own(told: list[tuple[int, int, float]]) -> None:
+@given(st.lists(st.tuples(st.integers(0, 7), WINNERS, MARGINS, st.integers(8, 13) | st.just(0)), max_size=20))
+def test_each_prediction_lies_in_one_cell_its_own(told: list[tuple[int, int, float, int]]) -> None:
     outcomes = np.array([each[0] for each in told], dtype=np.int8)
-    winners = np.array([each[1] for each in told], dtype=np.int64)
-    found = {
-        k: key
-        for key, rows in keys_of(outcomes, winners, np.array([m for *_, m in told]))
-        for k in rows.tolist()
-    }
+    winners, far = (np.array([each[k] for each in told], dtype=np.int64) for k in (1, 3))
+    margins = np.array([each[2] for each in told], dtype=np.float64)
+    found = {k: key for key, rows in keys_of(outcomes, winners, margins, far) for k in rows.tolist()}
     assert [found[k] for k in range(len(told))] == [key_of(*each) for each in told]
     assert len(set(found.values())) == len({key_of(*each) for each in told})
 
@@ -1334,3 +1336,59 @@ def test_of_who_makes_no_claims_no_run_ends_the_record() -> None:
         found.count(errors, 0.5)
     record = found.records[PERSISTENCE]
     assert (record.trials, record.hits) == (200.0, 60.0)
+
+
+@given(
+    st.lists(st.floats(0.0, 1e9) | st.sampled_from([2.0, 4.0, math.inf, math.nan]), min_size=1, max_size=20)
+)
+def test_bins_of_distances_are_the_same_in_arrays(distances: list[float]) -> None:
+    bins = [far_bin(each) for each in distances]
+    assert far_bins(np.array(distances)).tolist() == bins
+    for distance, place in zip(distances, bins, strict=True):
+        assert (place == 0) == (not distance >= 2.0)
+        if 0 < place < 13:  # octaves, from 2 on
+            assert 2.0 ** (place - 7) <= distance < 2.0 ** (place - 6)
+
+
+def test_an_approximation_is_claimed_no_further_than_it_was_asked() -> None:
+    near, far, further = Key(0, 1, 7), Key(0, 1, 8), Key(0, 1, 10)
+    known = Calibration()
+    for _ in range(200):
+        seen(known, values(own=1.0), 1.0, key=near)
+    said = values(own=1.0)
+    assert known.claims(near, known.assess(near, said))
+    told = known.assess(far, said)
+    assert (told.speaker, told.probability) == (OWN, 0.5)
+    assert not known.claims(far, told)
+    for _ in range(FEW - 1):
+        seen(known, said, 1.0, key=far)
+    assert known.assess(far, said).probability > 0.9
+    assert not known.claims(far, known.assess(far, said))  # few lie at the near edge of a bin
+    seen(known, said, 1.0, key=far)
+    assert known.claims(far, known.assess(far, said))
+    assert not known.claims(further, known.assess(further, said))
+
+
+def test_where_an_approximation_fails_far_out_it_is_claimed_near() -> None:
+    near, far = Key(0, 1, 7), Key(0, 1, 9)
+    known = Calibration()
+    for k in range(400):
+        seen(known, values(own=1.0), 1.0, key=near)
+        if k % 8 == 0:
+            seen(known, values(own=1.5), 1.0, key=far)
+    said = values(own=1.0)
+    assert known.claims(near, known.assess(near, said))
+    told = known.assess(far, said)
+    assert told.probability < 0.1
+    assert not known.claims(far, told)
+    assert known.assess(near, said).probability > 0.99
+    # Twice as far nobody has asked: what is known of less far counts.
+    assert known.assess(far._replace(lead=10), said).probability == told.probability
+
+
+def test_of_a_mode_that_was_never_asked_a_distance_tells_nothing() -> None:
+    known = right(100)
+    new = Key(0, 9, 9)
+    told = known.assess(new, values(own=1.0))
+    assert told == known.assess(new._replace(lead=7), values(own=1.0))
+    assert known.claims(new, told) == known.claims(new._replace(lead=7), told)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import count, islice, pairwise
 
 import numpy as np
@@ -186,6 +187,32 @@ def test_what_is_claimed_is_right_where_things_are_done(world: Callable[[np.rand
     assert claimed_and_off(asked, fresh) <= 0.01
     if world is motor:
         assert all(each.ok for each in asked)
+
+
+def valley(rng: np.random.Generator, wide: float = 0.1) -> Acts:
+    """A car in a valley: each episode of 200 steps begins so near its midst, and chance pushes it about."""
+    for k in count():
+        if k % 200 == 0:
+            x, v = float(rng.uniform(-0.5 - wide, -0.5 + wide)), 0.0
+        u, now = float(rng.integers(0, 3)) - 1.0, (x, v)
+        v = v + 0.001 * u - 0.0025 * np.cos(3.0 * x)
+        x += v
+        yield now, (u,), (x, v)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_approximation_is_not_claimed_where_it_was_never_tried(seed: int) -> None:
+    model, steps = WorldModel(schema_of(("x", "y"), ("u",))), acted(valley, seed, 1_000)
+    watched(model, steps)
+    assert model.property_model("self", "y").clusterer.approximate
+    for wide in (0.1, 0.5):
+        fresh = acted(partial(valley, wide=wide), 50, 1_000)
+        asked = [model.predict_one(step.before) for step in fresh]
+        assert claimed_and_off(asked, fresh) <= 0.01
+        told = model.predict_batch(fresh[0].before.layout, np.array([step.before.vector for step in fresh]))
+        assert told.ok.tolist() == [each.ok for each in asked]
+    near = [part.ok for each in asked for part in each.parts]
+    assert 0.1 < np.mean(near) < 0.9  # where it was tried it is claimed
 
 
 def right_from(said: list[ScenePrediction], steps: list[Transition]) -> int:

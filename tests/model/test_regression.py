@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from points import schema_of, transitions
 
 from relgym.model.fitting import compare_and_learn
@@ -29,11 +30,32 @@ def taught(n: int, most: int = 320, seed: int = 0) -> Regression:
     return found
 
 
+def said_of(found: Regression, rows: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Changes that regressions predict of some rows."""
+    told = found.values(SIGNATURE, rows)
+    return None if told is None else told.changes
+
+
+def test_distances_are_about_one_of_what_was_learned_and_grow_with_the_square() -> None:
+    found = taught(400)
+    told = found.values(SIGNATURE, np.random.default_rng(0).normal(size=(400, len(SIGNATURE.columns))))
+    assert told is not None
+    assert told.distances.mean() == pytest.approx(
+        1.0 + 1.0 / 3.0, rel=0.1
+    )  # of three columns, and their constant
+    far = found.values(SIGNATURE, np.outer([0.0, 10.0, 100.0, 1e200], np.ones(len(SIGNATURE.columns))))
+    assert far is not None
+    midst, near, further, out = far.distances
+    assert midst == pytest.approx(1.0 / 3.0, rel=0.1)
+    assert further / near == pytest.approx(100.0, rel=0.05)
+    assert np.isposinf(out)
+
+
 def test_sums_are_linear_and_products_are_not() -> None:
     found = taught(400)
     rows = np.random.default_rng(9).normal(size=(50, len(SIGNATURE.columns)))
     x, y, a = (rows[:, SIGNATURE.column(*key)] for key in ((0, "x"), (0, "y"), (1, "a")))
-    said = found.values(SIGNATURE, rows)
+    said = said_of(found, rows)
     assert said is not None
     assert found.targets == ["x", "y"]
     np.testing.assert_allclose(said[:, :, 1], np.stack([y + 2.0 * a] * 2, axis=1), atol=0.05)
@@ -43,10 +65,10 @@ def test_sums_are_linear_and_products_are_not() -> None:
 
 def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_columns() -> None:
     rows = np.zeros((1, len(SIGNATURE.columns)))
-    assert taught(FIRST - 1).values(SIGNATURE, rows) is None
-    assert taught(FIRST).values(SIGNATURE, rows) is not None
-    assert taught(FIRST, most=2).values(SIGNATURE, rows) is None
-    linear = taught(FIRST, most=3).values(SIGNATURE, rows)
+    assert said_of(taught(FIRST - 1), rows) is None
+    assert said_of(taught(FIRST), rows) is not None
+    assert said_of(taught(FIRST, most=2), rows) is None
+    linear = said_of(taught(FIRST, most=3), rows)
     assert linear is not None
     assert np.isfinite(linear[0]).all()
     assert len(taught(FIRST, most=3)._ridges) == 1
@@ -57,7 +79,7 @@ def test_products_count_as_far_as_their_leverage_allows() -> None:
     here = np.random.default_rng(9).normal(size=(4, len(SIGNATURE.columns)))
     rows = np.concatenate([here, 30.0 * here])
     own, leverage = found._said(rows[:, found._columns(SIGNATURE)])
-    said = found.values(SIGNATURE, rows)
+    said = said_of(found, rows)
     assert said is not None
     assert (leverage[:4] < 0.3).all() and (leverage[4:, 1] > 10.0).all()
     for target in (0, 1):
@@ -79,14 +101,14 @@ def test_nothing_is_said_of_what_nothing_tells() -> None:
     found = Regression(320)
     for row in rng.normal(size=(400, len(SIGNATURE.columns))):
         found.learn_one(SIGNATURE, row, {"x": float(rng.normal())})
-    said = found.values(SIGNATURE, rng.normal(size=(50, len(SIGNATURE.columns))))
+    said = said_of(found, rng.normal(size=(50, len(SIGNATURE.columns))))
     assert said is not None
     assert np.square(said[:, 1]).mean() < 0.5 * np.square(said[:, 0]).mean()
 
 
 def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
     found = taught(200)
-    said = found.values(SIGNATURE, np.full((1, len(SIGNATURE.columns)), 1e6))
+    said = said_of(found, np.full((1, len(SIGNATURE.columns)), 1e6))
     assert said is not None
     assert np.nanmax(np.abs(said)) < 20.0
 
@@ -100,7 +122,7 @@ def test_what_was_saved_says_and_learns_the_same() -> None:
         for row in more:
             for each in (found, again):
                 each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
-        one, other = found.values(SIGNATURE, more), again.values(SIGNATURE, more)
+        one, other = said_of(found, more), said_of(again, more)
         assert one is not None
         assert other is not None
         assert one.tobytes() == other.tobytes()
@@ -134,13 +156,13 @@ def test_of_a_gross_error_nothing_is_said_or_what_was_seen(wild: float) -> None:
     """No number beyond what changes were, no overflow, and no other row's values change for it."""
     found, rng = taught(150), np.random.default_rng(7)
     calm = rng.normal(size=(12, len(SIGNATURE.columns)))
-    before = found.values(SIGNATURE, calm)
+    before = said_of(found, calm)
     least, most = found._range
     slack = 0.5 * (most - least)
     for column in range(len(SIGNATURE.columns)):
         rows = calm.copy()
         rows[5, column] = wild
-        said = found.values(SIGNATURE, rows)
+        said = said_of(found, rows)
         assert before is not None and said is not None
         told = said[5][~np.isnan(said[5])]
         assert ((told >= np.min(least - slack)) & (told <= np.max(most + slack))).all()
@@ -158,7 +180,7 @@ def test_a_gross_error_that_is_learned_leaves_what_is_known_as_it_is(wild: float
             hit.learn_one(SIGNATURE, np.full(len(row), wild), {"x": 0.0, "y": 0.0})
         for each in (hit, calm):
             each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
-    said = [each.values(SIGNATURE, rows) for each in (hit, calm)]
+    said = [said_of(each, rows) for each in (hit, calm)]
     assert said[0] is not None and said[1] is not None
     assert said[0].tobytes() == said[1].tobytes()
     assert all(np.isfinite(array).all() for array in hit.to_arrays().values())
@@ -200,7 +222,7 @@ def test_bounds_are_half_a_range_beyond_what_was_seen() -> None:
     assert told[1] == pytest.approx((1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
     far = np.zeros((2, len(SIGNATURE.columns)))
     far[:, SIGNATURE.column(0, "y")] = -1e3, 1e3
-    said = found.values(SIGNATURE, far)
+    said = said_of(found, far)
     assert said is not None
     assert said[:, 0, 1].tolist() == list(told[1])
 

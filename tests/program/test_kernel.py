@@ -42,7 +42,9 @@ def test_what_somebody_looked_back_at(name: str, seed: int) -> None:
     model = looked_back(MODELS[name](), seed)
     layout, vectors = scenes_of(model, 60, seed)
     program = trusting(model._parts, layout, lowered(model._parts, layout))
-    assert any(a.regression is not None for a in program.answers) == (name == "cart with a rough velocity")
+    rough = name in ("cart with a rough velocity", "cart on a hill")
+    assert any(a.regression is not None for a in program.answers) == rough
+    assert any(a.trust is not None and a.trust.distant for a in program.answers) == (name == "cart on a hill")
     assert_alike(model._parts, layout, vectors)
 
 

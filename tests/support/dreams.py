@@ -122,6 +122,19 @@ def rough_model() -> WorldModel:
     return recorded(model, [CART_SCHEMA.scene({"cart": [0.0, 1.0]})], spaces.Box(-1.0, 1.0, (1,), np.float32))
 
 
+@cache
+def hilly_model() -> WorldModel:
+    """A cart on a hill, of which it has seen the foot: an approximation says what comes."""
+    rng = np.random.default_rng(0)
+    model = WorldModel(CART_SCHEMA, targets=CART_SCHEMA.targets[:2])  # type: ignore[index]
+    for x, v in rng.normal(0.0, 0.2, (400, 2)):
+        after = v - 0.05 * np.sin(x)
+        before = CART_SCHEMA.scene({"cart": [x, v], ACTION: [0.0], TASK: [0.0, 0.0]})
+        model.learn_one(Transition(before, before.replace({("cart", "x"): x + after, ("cart", "v"): after})))
+    model.finish()
+    return recorded(model, [CART_SCHEMA.scene({"cart": [0.0, 0.1]})], spaces.Box(-1.0, 1.0, (1,), np.float32))
+
+
 class FlatCart(gym.Env[Any, Any]):
     """The cart with flat numbers, x and v."""
 

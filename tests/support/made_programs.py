@@ -265,19 +265,22 @@ def _trusted(
     x: Sequence[float],
     width: int,
     said: tuple[float, int, int, float, float],
-    regressed: tuple[float, float],
+    regressed: tuple[float, float, float],
 ) -> tuple[float, int, int, tuple[float, float]]:
     value, outcome, mode, margin, guess = said
     functions = {m.id: m.function for m in a.modes}
     function = functions.get(trust.latest)
     latest = math.nan if function is None else _sum(function, x)
-    values = dict(zip(ir.EXPERTS, (value, guess, *regressed, latest, x[width + a.column]), strict=True))
+    *words, far = regressed
+    values = dict(zip(ir.EXPERTS, (value, guess, *words, latest, x[width + a.column]), strict=True))
     able = sum(1 << k for k, e in enumerate(ir.EXPERTS[:5]) if math.isfinite(values[e]))
     kind = PREDICTED if mode else outcome
     # Bins of leads: below 1/2, 1, 2, 4, 8, and more; 0: none, 7: nobody else was in it.
     lead = (
         0 if not margin > 0 else 7 if math.isinf(margin) else 1 + sum(margin >= 2.0**k for k in range(-1, 4))
     )
+    if trust.distant and mode and far >= 2.0:  # below 4, 8, 16, 32, 64, and more
+        lead = 8 + sum(far >= 2.0**k for k in range(2, 7))
     known = {(b.outcome, b.winner, b.lead, b.able): b for b in trust.beliefs}
     family = (mode > 0) - (mode < 0)
     keys = [(kind, mode, lead, able), (kind, mode, -1, able), (kind, family, -2, able)]
@@ -291,11 +294,11 @@ def _trusted(
     return values[ir.EXPERTS[b.speaker]], outcome, mode, (b.probability, b.interval)
 
 
-def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tuple[float, float]:
-    """What both regressions say, the second one as far as their leverages allow."""
+def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tuple[float, float, float]:
+    """What both regressions say, the second one as far as their leverages allow; how far the first one is asked."""
     if r is None:
-        return math.nan, math.nan
-    fit, words, whole = p.fits[r.fit], list[float](), 0.0
+        return math.nan, math.nan, 0.0
+    fit, words, distances, whole = p.fits[r.fit], list[float](), list[float](), 0.0
     shown = [(x[c] - centre) / scale for c, centre, scale in fit.columns]
     both = shown, shown + [a * b for a, b in itertools.combinations_with_replacement(shown, 2)]
     for z, row, reach, known in zip(both, r.weights, fit.leverage, r.trusted, strict=False):
@@ -311,9 +314,10 @@ def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tu
                 along += next(entries) * (1.0 if i == j else 2.0) * off[j]
             far += off[i] * along
         h = (far if far >= 0.0 else math.inf) + known.least
+        distances.append(h / min(1.0, len(z) * known.least))
         more = known.more * h if known.more else 0.0
         whole += (known.bias / (known.bias + more) if known.bias else 0.0) * (words[-1] - whole)
-    return x[r.present] + words[0], x[r.present] + whole
+    return x[r.present] + words[0], x[r.present] + whole, distances[0]
 
 
 # ---------------------------------------------------------------------- making them up
@@ -490,7 +494,7 @@ class _Maker:
         ]
         kinds = [(outcome, who, -2) for outcome in range(6) for who in (-1, 0, 1)]
         winners = [*(mode.id for mode in a.modes), 5, 7]
-        some = itertools.product((PREDICTED, UNEXPLAINED), winners, range(-1, 8))
+        some = itertools.product((PREDICTED, UNEXPLAINED), winners, range(-1, 14))
         kinds += [kind for kind in some if self.coin()]
         beliefs = []
         for outcome, winner, lead in kinds:
@@ -498,4 +502,4 @@ class _Maker:
                 speaker = rng.choice([*(k for k in range(5) if bits >> k & 1), 5])
                 sure, width = rng.choice((math.nan, 0.5, 0.99)), rng.randint(1, 99) / 8.0
                 beliefs.append(ir.Belief(outcome, winner, lead, bits, speaker, sure, width, self.coin()))
-        return ir.Trust(tuple(beliefs), False, latest)
+        return ir.Trust(tuple(beliefs), False, latest, a.regression is not None and self.coin())

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterable
 
 import numpy as np
-from dreams import cart_model, flat_model, line_model, lost_model, room_model, rough_model
+from dreams import cart_model, flat_model, hilly_model, line_model, lost_model, room_model, rough_model
 from hypothesis import strategies as st
 from law_streams import Stream, taught
 from numpy.typing import NDArray
@@ -100,6 +100,7 @@ MODELS = {
     "cart": cart_model,
     "cart with a lost velocity": lost_model,
     "cart with a rough velocity": rough_model,
+    "cart on a hill": hilly_model,
     "flat numbers": flat_model,
     "room by laws": lambda: room_model("auto"),
     "room by modes": room_model,
@@ -117,11 +118,13 @@ def looked_back(model: WorldModel, seed: int = 0) -> WorldModel:
             part.hindsight = Hindsight([(1, 1)] * 100)
         if part.clusterer.clusters:
             part.latest = min(part.clusterer.clusters)
-        bias = rng.choice([1e-13, 1.0], size=(8, len(EXPERTS)))
-        bias[rng.random(8) < 0.5, OWN] = 1e-13
+        bins = 14 if part.tells_how_far else 8
+        bias = rng.choice([1e-13, 1.0], size=(bins, len(EXPERTS)))
+        bias[rng.random(bins) < 0.5, OWN] = 1e-13
         for _ in range(400):
             winner = int(rng.choice(winners))
-            outcome, lead = (0 if winner else int(rng.integers(6))), int(rng.integers(8))
+            outcome = 0 if winner else int(rng.integers(6))
+            lead = int(rng.integers(bins if winner else 8))
             errors = bias[lead] * rng.normal(size=len(EXPERTS))
             errors[1:-1][rng.random(len(EXPERTS) - 2) < 0.3] = np.nan
             audit = Audit(Key(outcome, winner, lead), (*errors[:-1].tolist(), 1.0), 0)

@@ -530,6 +530,11 @@ class PropertyModel:
         return self.undecided and 2 * self.calibration.trials >= MEMORY
 
     @property
+    def tells_how_far(self) -> bool:
+        """Whether how right its modes are is known by how far a scene lies from what was learned: of approximations."""
+        return self.clusterer.approximate and self.rough
+
+    @property
     def lost(self) -> bool:
         """Whether modes aren't asked: nothing is explained, or an approximation errs more than the guess."""
         return self.fallback.unexplained or (
