@@ -37,7 +37,7 @@ from relgym.envs.views import NumbersView
 from relgym.errors import DataError
 from relgym.experiments.any_env_data import Study, stream
 from relgym.experiments.strangers_library import BASELINES, predicted, ridge, short
-from relgym.experiments.strangers_made import MADE
+from relgym.experiments.strangers_made import MADE, TEXTBOOK
 from relgym.files.writing import write_whole
 from relgym.model.compiled import KERNEL
 from relgym.model.fitting import compare_and_learn
@@ -65,6 +65,7 @@ FINAL: Final = (
     "Walker2d-v5",
     "MountainCarContinuous-v0",
     *MADE,
+    *TEXTBOOK,
 )
 """What nothing was chosen on."""
 

@@ -14,16 +14,17 @@ approximation how far from what it was made of it is asked; in those of its winn
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
 Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
-law that changed is doubted at once, and a mode whose conditions were found is believed at once. Who makes none is known
-by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more. Where
-it had none yet, all cells together tell whether it speaks.
+law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was
+believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
+known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
+Where it had none yet, all cells together tell whether it speaks.
 
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
 `ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
-from the records of those who speak now: what slipped before a law was known isn't held against the law. An approximation
-isn't claimed further out than it was asked and right, however right it is near: a misfit grows. Of a model that was
-never told how its predictions came out nothing is known, and nothing is doubted.
+from the records of those who speak now: what slipped before a law was known isn't held against the law. An
+approximation isn't claimed further out than it was asked and right, however right it is near: a misfit grows. Of a
+model that was never told how its predictions came out nothing is known, and nothing is doubted.
 """
 
 from __future__ import annotations
@@ -208,9 +209,9 @@ class _Record:
     hits: float = 0.0
     run: int = 0  # of hits (> 0) or misses (< 0), up to now
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
-    runs: list[float] = field(
-        default_factory=lambda: [0.0] * 4
-    )  # over: trials in those of misses, of hits; how many
+    # Over: trials in those of misses, of hits; how many. Then the mean length of those of hits in the two records
+    # before this one that misses ended; 0: there was none.
+    runs: list[float] = field(default_factory=lambda: [0.0] * 6)
     _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
     def add(self, hit: bool, times: int, *, fitted: bool) -> None:
@@ -252,15 +253,20 @@ class _Record:
         bits = -math.log2(one) - (length - 1) * math.log2(again) - math.log2(before + 1.0)
         self.trials += times
         self.hits += times * hit
-        # Hits come in runs where little happens: what was doubted is believed after more of them.
-        ended = before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= FEW)
+        # Hits come in runs where little happens: what was doubted is believed after more of them; what came and went
+        # twice comes and goes.
+        ended = (
+            before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= max(FEW, 2.0 * min(self.runs[4:])))
+        )
         if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
             self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
-            self.runs = [0.0] * 4
+            if not hit and self.runs[3]:
+                self.runs[4:] = self.runs[5], self.runs[1] / self.runs[3]
+            self.runs[:4] = [0.0] * 4
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
         if self.runs[0] + self.runs[1] > MEMORY:
-            self.runs = [0.5 * each for each in self.runs]
+            self.runs[:4] = [0.5 * each for each in self.runs[:4]]
         return ended
 
     def even(self) -> float:
@@ -933,7 +939,7 @@ class Calibration:
                             r.hits,
                             r.run,
                             [[k, n] for k, n in sorted(r.errors.items())],
-                            list(r.runs),
+                            r.runs[: 6 if r.runs[5] else 4],
                         ]
                         for who, r in sorted(cell.records.items())
                     ],
@@ -960,7 +966,7 @@ class Calibration:
                     float(hits),
                     int(run),
                     {int(k): float(c) for k, c in bins},
-                    [float(c) for c in runs],
+                    [*map(float, runs), 0.0, 0.0][:6],
                 )
                 for who, n, hits, run, bins, runs in each["records"]
             }

@@ -412,7 +412,7 @@ def test_a_run_of_hits_ends_a_record_when_it_is_no_short_one() -> None:
     found = record(FEW - 1, 255, hits_first=False)
     assert (found.trials, found.hits) == (255 + FEW - 1, FEW - 1)
     assert found.count(0.0, 1.0)
-    assert (found.trials, found.hits, found.runs) == (FEW + 1, FEW, [0.0] * 4)
+    assert (found.trials, found.hits, found.runs) == (FEW + 1, FEW, [0.0] * 6)
 
 
 def test_hits_alone_end_nothing() -> None:
@@ -426,7 +426,7 @@ def test_runs_are_counted_when_they_are_over() -> None:
     for hit, length in ((True, 3), (False, 2), (True, 2), (False, 1)):
         for _ in range(length):
             found.count(0.0 if hit else 2.0, 1.0)
-    assert found.runs == [2.0, 5.0, 1.0, 2.0]  # the last one isn't over
+    assert found.runs == [2.0, 5.0, 1.0, 2.0, 0.0, 0.0]  # the last one isn't over
     assert (found.trials, found.hits, found.run) == (8, 5, -1)
 
 
@@ -440,7 +440,7 @@ def test_where_misses_come_in_long_runs_another_one_is_no_news() -> None:
     together = 1 + math.ceil((10.0 + math.log2(41) - first) / after)
     assert (alone, together) == (7, 42)
     for runs, length in (([8.0, 31.0, 8.0, 9.0], alone), ([8.0, 31.0, 1.0, 2.0], together)):
-        known = _Record(40.0, 32.0, 1, {}, list(runs))
+        known = _Record(40.0, 32.0, 1, {}, [*runs, 0.0, 0.0])
         ended = [known.count(2.0, 1.0) for _ in range(length)]
         assert ended == [False] * (length - 1) + [True]
 
@@ -455,12 +455,41 @@ def test_the_older_half_of_a_record_counts_half() -> None:
     assert sum(found.errors.values()) == 512.5
 
 
+def test_who_was_believed_twice_and_failed_is_not_believed_at_once() -> None:
+    """Phases in which little happens come and go; what they tell is the share of hits in both."""
+    found, quiet, active = _Record(), [], []
+    for _ in range(5):
+        active += [found.count(1.0, 0.1) for _ in range(60)]
+        quiet += [found.count(0.0, 0.1) for _ in range(100)]
+        shares = found.hits / found.trials
+        if len(quiet) == 200:
+            assert shares > 0.95
+            assert found.runs[4:] == [0.0, 100.0]
+    assert [any(quiet[k : k + 100]) for k in range(0, 500, 100)] == [True, True, False, False, False]
+    assert 0.5 < shares < 0.8
+    assert found.runs[4:] == [100.0, 100.0]  # nothing ended it since
+    # What goes on is believed in the end, as the older half of a record counts half again and again.
+    assert not any(found.count(0.0, 0.1) for _ in range(5_000))
+    assert found.share(0.5) > 0.99
+
+
+def test_past_runs_are_kept_in_files() -> None:
+    known = Calibration()
+    for k in range(400):
+        seen(known, values(own=1.0 if k % 100 < 60 else 2.0), 1.0)
+    data = json.loads(json.dumps(known.to_json()))
+    lengths = {len(record[5]) for cell in data["cells"] for record in cell["records"]}
+    assert lengths == {4, 6}
+    again = Calibration.from_json(data, known.probability, known.allowed)
+    assert [c.records for c in again._cells.values()] == [c.records for c in known._cells.values()]
+
+
 def test_runs_are_halved_with_what_they_are_of() -> None:
     # 513 hits, a miss, 511 hits: the first run of hits is over. The miss after them ends the second one, and 1,025
     # trials in runs are more than are remembered.
-    found = _Record(600.0, 540.0, 511, {}, [1.0, 513.0, 1.0, 1.0])
+    found = _Record(600.0, 540.0, 511, {}, [1.0, 513.0, 1.0, 1.0, 0.0, 0.0])
     found.count(2.0, 1.0)
-    assert found.runs == [0.5, 512.0, 0.5, 1.0]
+    assert found.runs[:4] == [0.5, 512.0, 0.5, 1.0]
 
 
 def test_shares_by_hand() -> None:

@@ -12,6 +12,7 @@ from points import schema_of
 
 from relgym.experiments.law_trials import trial_rooms
 from relgym.experiments.law_worlds import Ball, Material, World
+from relgym.experiments.strangers import measure
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
@@ -213,6 +214,12 @@ def test_an_approximation_is_not_claimed_where_it_was_never_tried(seed: int) -> 
         assert told.ok.tolist() == [each.ok for each in asked]
     near = [part.ok for each in asked for part in each.parts]
     assert 0.1 < np.mean(near) < 0.9  # where it was tried it is claimed
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_nothing_is_claimed_of_what_calms_down_and_comes_again(seed: int) -> None:
+    """The stream ends in a calm, in which all that a bad law says of an epidemic is right."""
+    assert measure("relgym-strangers/Epidemic-v0", seed)["claimed_off"] <= 0.01
 
 
 def right_from(said: list[ScenePrediction], steps: list[Transition]) -> int:

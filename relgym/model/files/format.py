@@ -452,11 +452,15 @@ Kind: TypeAlias = tuple[
 ]
 
 
+Runs: TypeAlias = Annotated[list[Weight], Meta(min_length=4, max_length=6)]
+
+
 class CellRecord(Record):
     """How one kind of predictions came out: its key, who speaks, and of every expert what it left.
 
     A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
-    those of misses and of hits, and how many there were; squares are trials, the expert's own and those of saying that
+    those of misses and of hits, and how many there were, maybe then the mean lengths of those of hits in the two
+    records before this one that misses ended; squares are trials, the expert's own and those of saying that
     nothing changes. Steady are predictions in a row, up to now, that came out as such ones do, passed those of them for
     which the next one that is learned from stands; doubt are bits by which intervals held less often than they are to.
     """
@@ -466,7 +470,7 @@ class CellRecord(Record):
     heard: Weight
     steady: Count
     passed: Count
-    records: list[tuple[Expert, Weight, Weight, Whole, Bins, tuple[Weight, Weight, Weight, Weight]]]
+    records: list[tuple[Expert, Weight, Weight, Whole, Bins, Runs]]
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
     doubt: Weight = 0.0
 
