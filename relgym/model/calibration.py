@@ -159,7 +159,7 @@ def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
 
 
 def far_bin(distance: float) -> int:
-    """The bin of a squared distance (`FAR`); 0: it is less than twice that of most."""
+    """The bin of a squared distance (`FAR`); 0: it is below 2, about twice the mean of what was learned."""
     if not distance >= 2.0:
         return 0
     return FAR[-1] if math.isinf(distance) else min(NO_RUNNER_UP - 1 + math.frexp(distance)[1], FAR[-1])
