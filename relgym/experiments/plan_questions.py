@@ -19,7 +19,11 @@ __all__ = ["QUESTIONS", "Question"]
 
 _PLAN: Final = "relgym.experiments.plan"
 
-_EXPLORATION: Final[Mapping[str, tuple[int, int]]] = {"truck": (1_500, 25), "ball": (60, 1)}
+_EXPLORATION: Final[Mapping[str, tuple[int, int]]] = {
+    "truck": (1_500, 25),
+    "ball": (60, 1),
+    "materials": (1_000, 1),
+}
 """Real decisions in which agents get to know a world, and from one test of what they know to the next."""
 
 _MORE: Final = 2.0

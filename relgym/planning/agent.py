@@ -20,7 +20,7 @@ from relgym.errors import ConfigError, QueryError
 from relgym.model.world_model import WorldModel
 from relgym.numeric.changes import changed_at
 from relgym.planning.doubts import DoubtedTask, OptimisticTask
-from relgym.planning.exploration import Coverage, Familiar, relative_columns
+from relgym.planning.exploration import Coverage, Familiar, NoTask, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
 from relgym.planning.review import learned_again, length, missed, mixed, right
 from relgym.planning.rollouts import Objective
@@ -96,7 +96,9 @@ class PlanningAgent:
     config
         Of the new model.
     task
-        Reward and termination: ``"learned"``, ``"given"`` (the env's own `task`), or a task.
+        Reward and termination: ``"learned"``, ``"given"`` (the env's own `task`), or a task. None: no step is worth
+        anything, and what the env pays is left out; the agent only learns how the world moves, and goes where it
+        doesn't know that, with all its plans.
     view
         How observations become scenes, as for `TransitionRecorder`.
     search
@@ -110,7 +112,8 @@ class PlanningAgent:
         differs between episodes. Leave it out where a reset is expensive; steps are counted, resets aren't.
     exploration
         What a state that shows nothing but new pairs of values is worth while learning, in units of what a step pays
-        (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new.
+        (root mean square so far); 0: it does what the model says pays. Steps of unknown outcome count as entirely new,
+        and without a task as if all that follows were new, too.
     discount
         Of each decision: what comes sooner is surer, and episodes may be cut short.
     safe
@@ -169,6 +172,10 @@ class PlanningAgent:
             ActionRepeat(self._recorder, self.repeat) if repeat > 1 else self._recorder
         )
         self.exploration = checked_least("exploration", exploration, 0.0)
+        if task is None and not self.exploration:
+            raise ConfigError(
+                "task=None, exploration=0.0: nothing to act for; expected a task, or exploration above 0"
+            )
         self.discount, self.safe = Objective(discount=discount).discount, safe
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
@@ -196,6 +203,7 @@ class PlanningAgent:
         self._at_random = True
         self._next_review = self._next_after_change = _FIRST_REVIEW
         self._size = Spread()
+        self._has_task = task is not None
         spec = env.spec
         self._limit: int | None = None
         if spec is not None and spec.max_episode_steps is not None:
@@ -262,10 +270,13 @@ class PlanningAgent:
 
     def _objective(self, *, explores: bool) -> Objective:
         objective = Objective(discount=self.discount)
-        if explores and self.exploration > 0.0 and self.coverage is not None:
-            weight = self.exploration * (self._size.scale or 1.0)
-            return replace(objective, bonus=self.coverage.bonus(weight), curiosity=weight)
-        return objective
+        if not (explores and self.exploration > 0.0) or self.coverage is None:
+            return objective
+        weight = self.exploration * (self._size.scale or 1.0)
+        curiosity = weight
+        if not self._has_task:  # no plan that stays within what is known is worth as much
+            curiosity *= self._search.horizon if self.discount == 1.0 else 1.0 / (1.0 - self.discount)
+        return replace(objective, bonus=self.coverage.bonus(weight), curiosity=curiosity)
 
     def _at_work(self, *, explores: bool) -> Planner:
         """The planner for what has been learned by now; made anew only when another model takes over."""
@@ -296,7 +307,10 @@ class PlanningAgent:
                 self._observation, _ = self.env.reset(seed=int(self._rng.integers(2**31)))
                 self._thread, self._held = PlannerState(), (0, None)
                 self._begun += 1
-                self._at_random = self.steps < self.random_steps or self._rng.random() < self.doubt
+                # Who only wants to know plans with what little it knows: there is more to find where that ends.
+                self._at_random = self.steps < self.random_steps or (
+                    self._has_task and bool(self._rng.random() < self.doubt)
+                )
                 self._hold = int(self._rng.choice(_HOLDS, p=_SHARES))
                 self._lasts = None
                 if self._at_random and self.restarts:
@@ -328,8 +342,9 @@ class PlanningAgent:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = True,
     ) -> tuple[Any, States]:
-        """Choose what pays; as `Planner.predict`."""
-        return self._at_work(explores=False).predict(observation, state, episode_start, deterministic)
+        """Choose what pays, or without a task what is new unless it is to be safe; as `Planner.predict`."""
+        planner = self._at_work(explores=not self._has_task and not self.safe)
+        return planner.predict(observation, state, episode_start, deterministic)
 
     def _choose(self, observation: Any) -> Any:
         """A random action at first and while nothing is known; then the next of a plan."""
@@ -365,6 +380,8 @@ class PlanningAgent:
 
     def _take_up(self, real: Experience) -> None:
         """Learn from a real step."""
+        if not self._has_task:
+            real = replace(real, reward=0.0, terminated=False)
         surplus, _ = self._surplus(self.trainer.reward_model, [real])
         self.trainer.take_up(real)
         self.steps += 1
@@ -536,6 +553,8 @@ def _fitted(after: Scene, like: Scene) -> Float1D:
 
 
 def _task(task: Any, env: gym.Env[Any, Any]) -> Any:
+    if task is None:
+        return NoTask()
     if isinstance(task, str) and task == "given":
         own = getattr(env.unwrapped, "task", None)
         if own is None:
@@ -544,5 +563,5 @@ def _task(task: Any, env: gym.Env[Any, Any]) -> Any:
             )
         return own
     if isinstance(task, str) and task != "learned":
-        raise ConfigError(f"task={task!r}: expected 'learned', 'given' or a task")
+        raise ConfigError(f"task={task!r}: expected 'learned', 'given', a task or None")
     return task

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from relgym.arguments import array_of, refusing_calls
 from relgym.envs.arguments import checked_count, checked_least
+from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError
 from relgym.planning.rollouts import Bonus
 from relgym.planning.simulators import Correctable, Simulator, Steps
 from relgym.scene.objects import POSE, TASK, Float1D, Float2D, Scene, SceneLayout
 from relgym.wrappers.views import ViewLike, recordable, view_of
 
-__all__ = ["Coverage", "Explore", "Familiar", "relative_columns"]
+__all__ = ["Coverage", "Explore", "Familiar", "NoTask", "relative_columns"]
 
 _OCTAVES: Final = 6
 """Values are told apart by sign and power of two, down to this many powers below the largest one seen; below it they
@@ -227,6 +228,15 @@ class _Paid:
     def __call__(self, states: Float2D, actions: NDArray[Any], following: Float2D) -> Float1D:
         paid: Float1D = self.weight * self.coverage.novelty(following) + self.coverage.surplus(following)
         return paid
+
+
+class NoTask(RewardFunctions):
+    """No step is worth anything, and none ends an episode: for agents that only want to know."""
+
+    def evaluate(self, layout: SceneLayout, before: Float2D, actions: Any, after: Float2D) -> TaskOutcome:
+        """Nothing, of n steps."""
+        never = np.zeros(len(before), dtype=np.bool_)
+        return TaskOutcome(np.zeros(len(before)), never, never)
 
 
 @refusing_calls(ConfigError)

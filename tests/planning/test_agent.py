@@ -53,7 +53,11 @@ def test_a_callback_ends_learning() -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"exploration": -1.0}, {"random_steps": -1}, {"task": "known"}, {"repeat": 0}]
+    "options",
+    [
+        *({"exploration": -1.0}, {"random_steps": -1}, {"task": "known"}, {"repeat": 0}),
+        {"task": None, "exploration": 0.0},
+    ],
 )
 def test_settings_out_of_range_are_refused(options: dict[str, Any]) -> None:
     with pytest.raises(ConfigError, match="expected"):
@@ -90,6 +94,29 @@ def test_where_more_was_paid_than_it_can_account_for_it_looks_again() -> None:
     objective = made._objective(explores=True)
     assert objective.curiosity == weight > 0.0
     assert made._objective(explores=False).bonus is None
+
+
+def test_without_a_task_nothing_pays_and_what_is_unknown_is_worth_most() -> None:
+    made = agent(task=None, random_steps=0).learn(60)
+    assert made.model.seen == 60 and not made._at_random  # its plans are random actions where all is unknown
+    assert made.coverage is not None and not made.coverage._paid  # though the env pays for the truck's way
+    objective = made._objective(explores=True)
+    assert objective.bonus is not None and objective.curiosity is not None
+    # More than all that follows could show, were every step of it entirely new.
+    assert objective.curiosity >= made.exploration * sum(made.discount**k for k in range(1_000)) > 0.0
+    seen, _ = made.env.reset(seed=0)
+    assert made.env.action_space.contains(made.predict(seen)[0])
+
+
+def test_who_discounts_nothing_counts_as_far_as_the_search_looks() -> None:
+    made = agent(task=None, discount=1.0, random_steps=0).learn(4)
+    assert made._objective(explores=True).curiosity == made.exploration * SEARCH.horizon
+
+
+def test_careful_without_a_task_it_stays_where_it_was() -> None:
+    search = TreeSearch(horizon=6, expansions=128, batch=64)
+    made = PlanningAgent(Pit(begin=11.0, steps=6), search=search, task=None, safe=True).learn(150)
+    assert falls(made, 10, begin=11.0) == 0
 
 
 def test_episodes_that_were_cut_short_tell_how_long_they_may_last() -> None:
