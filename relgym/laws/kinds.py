@@ -171,7 +171,7 @@ def _law(
     )
     # Sides of 0 on which no velocity was ever seen: what ends there would be outside experience.
     signs = (bool((examples.y < -examples.tolerance).any()), bool((examples.y > examples.tolerance).any()))
-    unexplained = int((~fit.explained).sum())
+    excused = np.isin(kinds, [k for k in present if names[k] in doubted])
     return AxisLaw(
         fit.pieces,
         fit.operator,
@@ -179,7 +179,8 @@ def _law(
         fit.alternatives,
         signs,
         len(examples),
-        unexplained,
+        int((~fit.explained).sum()),
         fit.bits,
         doubted,
+        int((~fit.explained & excused).sum()),
     )

@@ -99,6 +99,8 @@ class AxisLaw:
         Description length, the unexplained examples included.
     doubted
         Kinds of contacts of which it leaves surely more unexplained than a law may: rare ones don't show among all.
+    excused
+        Of the unexplained examples those of doubted kinds: they say nothing of the others.
     """
 
     pieces: tuple[Piece, ...]
@@ -110,6 +112,7 @@ class AxisLaw:
     unexplained: int = 0
     bits: float = 0.0
     doubted: tuple[Kind, ...] = ()
+    excused: int = 0
 
     def values(self, features: Mapping[str, FloatArray], like: FloatArray) -> FloatArray:
         """Velocity after the contact along the axis."""
@@ -130,14 +133,20 @@ class AxisLaw:
         """Whether it explains nearly all of its own examples (of a kind): what it doesn't, it must not claim.
 
         A kind never seen is doubted where one of the bodies is known from doubted kinds alone: what a belt does to
-        boxes no law says, and it may do that to others.
+        boxes no law says, and it may do that to others. So it is where one is known from some, and the other not at
+        all: a floor isn't like a box to a ball, and a ramp may be like neither.
         """
-        if self.unexplained > LEFT_OPEN * self.examples or kind in self.doubted:
+        if (
+            self.unexplained - self.excused > LEFT_OPEN * (self.examples - self.excused)
+            or kind in self.doubted
+        ):
             return False
         if kind is None or kind in self.kinds or not self.doubted:
             return True
         fine = {name for each in self.kinds if each not in self.doubted for name in each}
-        return not any(name not in fine and any(name in each for each in self.doubted) for name in kind)
+        odd = {name for each in self.doubted for name in each}
+        new = any(name not in fine | odd for name in kind)
+        return not any(name in odd and (new or name not in fine) for name in kind)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back."""
@@ -150,7 +159,11 @@ class AxisLaw:
             "examples": self.examples,
             "unexplained": self.unexplained,
             "bits": self.bits,
-        } | ({"doubted": [list(kind) for kind in self.doubted]} if self.doubted else {})
+        } | (
+            {"doubted": [list(kind) for kind in self.doubted], "excused": self.excused}
+            if self.doubted
+            else {}
+        )
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> AxisLaw:
@@ -165,6 +178,7 @@ class AxisLaw:
             int(data["unexplained"]),
             float(data["bits"]),
             tuple((str(a), str(b)) for a, b in data.get("doubted", ())),
+            int(data.get("excused", 0)),
         )
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,6 +196,14 @@ def test_who_is_known_from_doubted_kinds_alone_is_doubted_with_others_too() -> N
     assert law.trusted(("box", "wall")) and not law.trusted(("box", "belt"))
     assert not law.trusted(("disc", "belt"))  # never seen: whatever the belt does to boxes
     assert law.trusted(("disc", "wall"))
-    assert law.trusted(("box", "disc"))  # boxes are all right against walls
+    assert not law.trusted(("box", "disc"))  # to a box a disc may be like the wall or like the belt
     assert law.trusted(("disc", "tee"))  # of both nothing is known that would speak against it
     assert AxisLaw((FREE,), "max", kinds, examples=100).trusted(("disc", "belt"))
+
+
+def test_what_is_doubted_says_nothing_against_the_rest() -> None:
+    kinds = (("ball", "box"), ("ball", "floor"))
+    law = AxisLaw((FREE,), "max", kinds, examples=7, unexplained=3, doubted=kinds[1:], excused=3)
+    assert law.trusted(kinds[0]) and not law.trusted(kinds[1]) and not law.trusted(("ball", "ramp"))
+    assert AxisLaw.from_json(law.to_json()) == law
+    assert not replace(law, excused=2).trusted(kinds[0])

@@ -668,6 +668,9 @@ def _check_axis(law: AxisLawRecord, known: Collection[str], bodies: Collection[s
     _require(
         set(law.doubted) <= set(law.kinds), "laws.pair.axes", "expected doubts of kinds that a law is of"
     )
+    _require(
+        law.excused <= law.unexplained, "laws.pair.axes", "expected no more excused than unexplained examples"
+    )
     for pieces in (law.pieces, *(pieces for _, pieces in law.alternatives)):
         for terms in pieces:
             _check_terms(terms, known, "laws.pair.axes")

@@ -552,6 +552,7 @@ class AxisLawRecord(Record):
     unexplained: Count
     bits: Spread
     doubted: list[Pair] = []
+    excused: Count = 0
 
 
 class PairLawRecord(Record):
