@@ -391,9 +391,9 @@ def _leverage(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np
     for own in design.T:
         rest = own
         for other in spanned:  # not LAPACK, whose results may depend on its threads
-            rest = rest - (other * rest).sum() * other
-        size = float(np.sqrt(np.square(rest).sum()))
-        if size > PIVOT * float(np.sqrt(np.square(own).sum())):
+            rest = rest - np.add.reduce(other * rest) * other
+        size = math.sqrt(float(np.add.reduce(rest * rest)))
+        if size > PIVOT * math.sqrt(float(np.add.reduce(own * own))):
             spanned.append(rest / size)
             shares += np.square(spanned[-1])
     return shares

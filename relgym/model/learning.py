@@ -239,7 +239,7 @@ def _learn_object(
     for target, model in parts.by_type[type_name]:
         column = layout.column(index, target.property)
         y = float(following[column])
-        rough |= model.rough
+        rough = rough or model.rough
         changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
         if target.property in weights:
             report = model.learn_one(

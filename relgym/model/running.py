@@ -410,7 +410,7 @@ class Runner:
                 return None
             model, lawful = teller.model, a.component >= 0
             others = None if model.candidates else teller.values(said, numbers)
-            away = far[k] if raw.mode and not lawful and model.tells_how_far else 0
+            away = far[k] if far[k] and raw.mode and not lawful and model.tells_how_far else 0
             one = settled(parts, model, percept, teller.index, following, raw, others, away, lawful=lawful)
             following[a.column] = one.value
             found.append(one)

@@ -82,17 +82,19 @@ def draw_samples(
     found = np.empty((draws, min(size, n)), dtype=np.intp)
     for piece in _pieces(draws, DRAWN, n):
         for part in _pieces(len(first[piece]), CHUNK, n):
-            base, how = first[piece][part], style[piece][part, None]
+            base, how = first[piece][part], style[piece][part]
             keys = rng.random((len(base), n))
             if strata is not None:
-                other = strata[None, :] != strata[base][:, None]
+                alike = np.flatnonzero(how == 1)
+                own = base[alike]
+                other = strata[None, :] != strata[own][:, None]
                 further = 2.0 * other
                 if apart is not None:
                     few = n - other.sum(axis=1) < size
-                    further[few] = np.where(other[few], 1.0 + apart[base[few]], 0.0)
-                keys += np.where(how == 1, further, 0.0)
-            age = np.abs(np.arange(n)[None, :] - base[:, None])
-            keys += np.where(how == 2, age // (2 * size), 0.0)
+                    further[few] = np.where(other[few], 1.0 + apart[own[few]], 0.0)
+                keys[alike] += further
+            near = np.flatnonzero(how == 2)
+            keys[near] += np.abs(np.arange(n)[None, :] - base[near][:, None]) // (2 * size)
             keys[np.arange(len(base)), base] = -1.0
             found[piece][part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
         yield CALL + 2 * len(first[piece]) * n
@@ -222,26 +224,29 @@ def _choose(
     ``(draws, size)``.
     """
     _, draws, d = a.shape
-    sizes = np.square(a).sum(axis=0)
+    sizes = pivots = np.add.reduce(np.square(a), axis=0)
     chosen = np.full((draws, max(terms, 1)), -1, dtype=np.intp)
+    across: NDArray[np.float64] | None = None  # what was chosen last, and isn't swept out of the others yet
     for t in range(min(terms, d)):
-        left = np.square(residual).sum(axis=1)
+        left = np.add.reduce(np.square(residual), axis=1)
         open_ = left > enough
         if not open_.any():
             break
-        pivots = np.square(a).sum(axis=0)
+        if across is not None:
+            a -= across * np.add.reduce(across * a, axis=0)
+            pivots = np.add.reduce(np.square(a), axis=0)
         usable = (pivots > 1e-16 * sizes) & (sizes > 0.0)
-        gains = np.square((a * residual.T[:, :, None]).sum(axis=0)) / np.where(usable, pivots, np.inf)
+        along = np.add.reduce(a * residual.T[:, :, None], axis=0)
+        gains = np.square(along) / np.where(usable, pivots, np.inf)
         best, found = _best_columns(gains, usable, left, len(a) * sigma**2)
         take = open_ & found
         chosen[take, t] = best[take]
         q = np.where(take[:, None], a[:, np.arange(draws), best].T, 0.0)
-        length = np.sqrt(np.square(q).sum(axis=1))
+        length = np.sqrt(np.add.reduce(np.square(q), axis=1))
         q /= np.where(length > 0.0, length, 1.0)[:, None]
-        residual = residual - (q * residual).sum(axis=1)[:, None] * q
+        residual = residual - np.add.reduce(q * residual, axis=1)[:, None] * q
         across = np.ascontiguousarray(q.T)[:, :, None]
-        a -= across * (across * a).sum(axis=0)
-    return chosen, np.square(residual).sum(axis=1)
+    return chosen, np.add.reduce(np.square(residual), axis=1)
 
 
 def _choose_among_many(

@@ -106,10 +106,10 @@ def least_squares(
     factors, rest = _factors(a), y - shift
     weights = factors.solve(rest)
     weights += factors.solve(rest - _combine(a, weights))
-    constant = shift - float((centre * weights).sum()) if intercept else 0.0
+    constant = shift - float(np.add.reduce(centre * weights)) if intercept else 0.0
     kept = [k for k in sorted(range(len(columns)), key=columns.__getitem__) if weights[k] != 0.0]
     fit = LinearFit(tuple(columns[k] for k in kept), tuple(float(weights[k]) for k in kept), constant, 0.0)
-    return LinearFit(fit.columns, fit.weights, constant, float(np.square(y - fit.predict(x)).sum()))
+    return LinearFit(fit.columns, fit.weights, constant, float(np.add.reduce(np.square(y - fit.predict(x)))))
 
 
 def fitting_cells(rows: int, terms: int) -> int:
@@ -118,7 +118,7 @@ def fitting_cells(rows: int, terms: int) -> int:
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    total: NDArray[np.float64] = (a * weights).sum(axis=1)
+    total: NDArray[np.float64] = np.add.reduce(a * weights, axis=1)
     return total
 
 
@@ -136,7 +136,7 @@ class _Factors:
 
     def solve(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
         """Weights of the least-squares solution; exactly zero for columns collinear with earlier ones."""
-        r, parts = self.r.tolist(), (self.q * y).sum(axis=1).tolist()
+        r, parts = self.r.tolist(), np.add.reduce(self.q * y, axis=1).tolist()
         weights = [0.0] * len(parts)
         for k in reversed(range(len(parts))):
             row = r[k]
@@ -174,9 +174,9 @@ def _factors(a: NDArray[np.float64]) -> _Factors:
         size = _length(column)
         if k:
             for _ in range(2):
-                parts = (q[:k] * column).sum(axis=1)
+                parts = np.add.reduce(q[:k] * column, axis=1)
                 r[:k, k] += parts
-                column -= (q[:k] * parts[:, None]).sum(axis=0)
+                column -= np.add.reduce(q[:k] * parts[:, None], axis=0)
         left = _length(column)
         if left > PIVOT * size:
             np.divide(column, left, out=q[k])
@@ -185,7 +185,7 @@ def _factors(a: NDArray[np.float64]) -> _Factors:
 
 
 def _length(column: NDArray[np.float64]) -> float:
-    return math.sqrt(float(np.square(column).sum()))
+    return math.sqrt(float(np.add.reduce(column * column)))
 
 
 @resumable

@@ -348,7 +348,9 @@ class PlanningAgent:
 
     def _choose(self, observation: Any) -> Any:
         """A random action at first and while nothing is known; then the next of a plan."""
-        if self._at_random:
+        if self._at_random or (
+            not self._has_task and self.doubt == 1.0
+        ):  # what is new need not be looked for
             return self._random()
         assert self._thread is not None, "made with the episode"
         try:

@@ -466,7 +466,7 @@ class PropertyModel:
         See `relgym.model.target.hindsight`. With a single mode there is no choice; whether it holds is told by the
         examples that it leaves over.
         """
-        return len(self.classifier.modes) > 1 and self.hindsight.undecided
+        return self.hindsight.undecided and len(self.classifier.modes) > 1
 
     def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
         """Who gives the value of a prediction, how right it will be, and whether it is claimed."""
