@@ -36,7 +36,20 @@ def test_an_exception_among_many_contacts_that_act_is_none_of_the_kind(rng: np.r
     for count, doubted in ((7, (("box", "shelf"),)), (8, ())):
         some = examples.rows(np.arange(208) < 200 + count)
         (law,) = fit_together(some, np.repeat([0, 1], [200, count]), names, rng=rng).laws
-        assert law.doubted == doubted
+        assert law.doubted == doubted and law.excused == len(doubted)
+
+
+def test_what_others_do_is_not_held_against_a_kind_that_obeys(rng: np.random.Generator) -> None:
+    v = rng.uniform(-1.0, -0.5, 9)
+    u = v - 0.01
+    bounce = np.repeat([0.5, 0.9, 0.3], [6, 2, 1])
+    x = np.stack([u, v, np.ones(9)], axis=1)
+    examples = AxisExamples(("u_n", "v_n", "1"), x, np.maximum(u, -bounce * v), "u_n", 1e-9)
+    names = [("ball", "box"), ("ball", "floor"), ("ball", "wall")]
+    (law,) = fit_together(examples, np.repeat([0, 1, 2], [6, 2, 1]), names, rng=rng).laws
+    assert law.unexplained == law.excused == 3 and set(law.doubted) == set(names[1:])
+    assert law.trusted(names[0])
+    assert not any(law.trusted(kind) for kind in (*names[1:], ("ball", "ramp")))
 
 
 def test_where_materials_differ_a_kind_shows_its_number_before_it_is_claimed(
