@@ -543,12 +543,12 @@ class _Source:
         if all(a.trust is None for a in self.program.answers):
             return
         add(
-            "# ---- how right predictions were: by outcome, mode (laws below 0), bin of the margin or, from 8 on, of how"
+            "# ---- how right predictions were: by outcome, mode (laws below 0), bin of the margin or, from 8 on, of"
         )
         add(
-            "# far from what was learned an approximation is asked (-1: all others, -2: of all other modes), and whose"
+            "# how far from what was learned an approximation is asked (-1: all others, -2: of all other modes), and"
         )
-        add("# values there are (bits of EXPERTS): who speaks, and how sure that is")
+        add("# whose values there are (bits of EXPERTS): who speaks, and how sure that is")
         add(f"EXPERTS = {ir.EXPERTS!r}")
         if self.program.fits:
             add(
