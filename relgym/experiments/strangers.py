@@ -13,7 +13,7 @@ one file is for one kind of run. Envs ending in ``-v5`` need the extra ``bench-e
 - *coverage*: the share of next values inside the 95 % interval stated;
 - with ``--advised``: the same with the features that are advised, learned from the same steps, and *against library
   ridge* and *against PySINDy* on the same columns (`relgym.experiments.strangers_library`);
-- process time per step, mean and largest. What is loaded once in a process, the compiled kernel, is loaded before, and
+- processor time per step, mean and largest. What is loaded once in a process, the compiled kernel, is loaded before, and
   what Python's garbage collector does with all that was there before isn't counted: it is the same for any program.
 """
 
@@ -127,12 +127,12 @@ def measure(env_id: str, seed: int, steps: int = STEPS, *, advised: bool = False
 def _taught(
     view: NumbersView, training: Sequence[Transition], config: ModelConfig
 ) -> tuple[WorldModel, list[float]]:
-    """A model of some steps, and the process time that each took."""
+    """A model of some steps, and the processor time that each took."""
     model, costs = WorldModel(view.schema, config), []
     for transition in training:
-        began = time.process_time()
+        began = time.thread_time()
         compare_and_learn(model, transition, model.predict_one(transition.before), precision=view.precision)
-        costs.append(time.process_time() - began)
+        costs.append(time.thread_time() - began)
     model.finish()
     return model, costs
 
