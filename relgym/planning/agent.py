@@ -316,13 +316,13 @@ class PlanningAgent:
                 if self._at_random and self.restarts:
                     self._lasts = int(self._rng.choice(_LENGTHS, p=_LENGTH_SHARES))
                     self._hold = min(self._hold, max(1, self._lasts // _DIFFERENT))
+            assert self._thread is not None, "made with the episode"
+            decisions = self._thread.decisions + 1  # planned or not
             action = self._choose(self._observation)
+            self._thread.decisions = decisions
             self._observation, _, terminated, truncated, _ = self.env.step(action)
             for real in self._recorder.take():
                 self._take_up(real)
-            assert self._thread is not None, "made with the episode"
-            if self._at_random:
-                self._thread.decisions += 1
             if truncated:  # so long, then, an episode may last
                 self._limit = max(self._limit or 1, self._thread.decisions)
             if terminated or truncated or self._thread.decisions == self._lasts:

@@ -119,8 +119,9 @@ def test_careful_without_a_task_it_stays_where_it_was() -> None:
     assert falls(made, 10, begin=11.0) == 0
 
 
-def test_episodes_that_were_cut_short_tell_how_long_they_may_last() -> None:
-    made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, random_steps=20).learn(30)
+@pytest.mark.parametrize("options", [{"random_steps": 20}, {"task": None, "random_steps": 0}])
+def test_episodes_that_were_cut_short_tell_how_long_they_may_last(options: dict[str, Any]) -> None:
+    made = PlanningAgent(Pit(begin=60.0, steps=6), search=SEARCH, **options).learn(30)
     assert made._limit == 6
 
 
