@@ -13,7 +13,7 @@ one file is for one kind of run. Envs ending in ``-v5`` need the extra ``bench-e
 - *coverage*: the share of next values inside the 95 % interval stated;
 - with ``--advised``: the same with the features that are advised, learned from the same steps, and *against library
   ridge* and *against PySINDy* on the same columns (`relgym.experiments.strangers_library`);
-- processor time per step, mean and largest. What is loaded once in a process, the compiled kernel, is loaded before; and
+- processor time per step, mean and largest. What is loaded once in a process, the kernel, is loaded before, and
   what Python's garbage collector does with all that was there before isn't counted: it is the same for any program.
 """
 
