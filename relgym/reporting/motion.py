@@ -109,10 +109,13 @@ class MotionRules:
         return f"{examples:,} steps{wrong}  ± {self.tolerance:.2g}"
 
     def _axis(self, letter: str, law: AxisLaw, digits: int, *, alone: bool) -> Iterator[tuple[str, str, str]]:
-        whom = "" if alone else f" ({', '.join('-'.join(kind) for kind in law.kinds)})"
+        # Where some kinds are doubted it takes all of them to tell what is claimed of others (`AxisLaw.trusted`).
+        named = law.doubted or not alone
+        whom = f" ({', '.join('-'.join(kind) for kind in law.kinds)})" if named else ""
         where = DIRECTIONS.get(letter, f"along {letter}")
         points = " (of the points that touch)" if self.pair is not None and self.pair.frame == POINT else ""
-        yield f"touching{whom}, {where}{points}:", "", self._stats(law.examples, law.unexplained)
+        stats = self._stats(law.examples - law.excused, law.unexplained - law.excused)
+        yield f"touching{whom}, {where}{points}:", "", stats
         texts = [piece.formula(digits) for piece in law.pieces]
         sign = _SIGN[law.operator]
         for number, (piece, text) in enumerate(zip(law.pieces, texts, strict=True)):

@@ -29,6 +29,7 @@ BOUNCE = AxisLaw(
     unexplained=2,
 )
 SLIDE = AxisLaw((Piece((("u_t", 1.0),)),), "max", (), signs=(False, False), examples=3000)
+MET = (("ball", "box"), ("ball", "ramp"))
 RULES = MotionRules(
     (FREE,),
     (("ball", ("vx", "vy")),),
@@ -66,6 +67,15 @@ def test_read_back() -> None:
     assert parse_motion(body(RULES.text())) == RULES
 
 
+def test_what_is_doubted_of_a_kind_says_nothing_against_the_others_in_text_either() -> None:
+    law = replace(BOUNCE, kinds=MET, doubted=MET[1:], examples=7, unexplained=3, excused=3)
+    read = parse_motion(body(replace(RULES, pair=PairLaw("contact", ((law,), (SLIDE,)), 0.0)).text()))
+    assert read is not None and read.pair is not None
+    found = read.pair.axes[0][0]
+    for kind in (*MET, ("ball", "floor")):
+        assert found.trusted(kind) == law.trusted(kind) == (kind == MET[0])
+
+
 EVERY = {
     "a minimum": replace(
         RULES, pair=PairLaw("world", ((replace(BOUNCE, operator="min"),), (SLIDE,)), 0.0), letters="xy"
@@ -101,7 +111,7 @@ EVERY = {
         ),
     ),
     "doubts": replace(
-        RULES, pair=PairLaw("contact", ((replace(BOUNCE, doubted=(("ball", "ramp"),)),), (SLIDE,)), 0.0)
+        RULES, pair=PairLaw("contact", ((replace(BOUNCE, kinds=MET, doubted=MET[1:]),), (SLIDE,)), 0.0)
     ),
     "grips": replace(
         RULES,
