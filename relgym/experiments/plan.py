@@ -349,8 +349,8 @@ def knowing(*, course: str, explores: bool, seed: int, steps: int, every: int = 
     """How many real decisions it takes to know a world: of 99 % of fresh steps all laws, and the task if it counts.
 
     Where there is an expert fresh steps are its own and those of random play, in equal shares, and reward and end
-    count. In BallGoal nothing pays: fresh steps are those of random play in which the ball touches something, and 99 %
-    have to be right of what touches each of the bodies.
+    count. In BallGoal the agent has no task: fresh steps are those of random play in which the ball touches something,
+    and of each body 99 % of those have to be right that touch it.
 
     Parameters
     ----------

@@ -228,7 +228,8 @@ class PlanningAgent:
     def doubt(self) -> float:
         """Share of the latest real steps of which the model predicted the next scene wrongly, or not at all.
 
-        So many episodes are spent on random actions: a plan in a model that is wrong is no better, and teaches less.
+        With a task so many episodes are spent on random actions: a plan in a model that is wrong is no better, and
+        teaches less.
         """
         latest = list(self._wrong)[-_LATEST:]
         return sum(latest) / len(latest) if latest else 1.0
@@ -348,9 +349,8 @@ class PlanningAgent:
 
     def _choose(self, observation: Any) -> Any:
         """A random action at first and while nothing is known; then the next of a plan."""
-        if self._at_random or (
-            not self._has_task and self.doubt == 1.0
-        ):  # what is new need not be looked for
+        all_is_new = not self._has_task and self.doubt == 1.0  # and need not be looked for
+        if self._at_random or all_is_new:
             return self._random()
         assert self._thread is not None, "made with the episode"
         try:
