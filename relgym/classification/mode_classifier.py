@@ -346,7 +346,7 @@ class ModeClassifier:
         """Which exemplars teach each pair, and for which of its modes they are examples: see `pair_labels`."""
         assigned, fits, modes = self.exemplars.assigned, self.exemplars.columns["fits"], self.modes
         owners = self._owners.owners(self.exemplars)
-        return {pair: pair_labels(assigned, owners, fits, modes, *pair) for pair in pairs}
+        return pair_labels(assigned, owners, fits, modes, pairs)
 
     def _scope(self, i: int, j: int) -> Scope:
         return Scope.of(self.vocabulary, self.config, (i, j))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -142,9 +144,9 @@ class PairState:
 
 
 def pair_labels(
-    assigned: Any, owners: Any, fits: Any, modes: tuple[int, ...], i: int, j: int
-) -> NDArray[np.int8]:
-    """1 for an example of mode `i`, -1 for one of `j`, 0 for one that isn't used.
+    assigned: Any, owners: Any, fits: Any, modes: tuple[int, ...], pairs: Iterable[tuple[int, int]]
+) -> dict[tuple[int, int], NDArray[np.int8]]:
+    """For each pair (i, j) 1 for an example of mode `i`, -1 for one of `j`, 0 for one that isn't used.
 
     An example counts for the mode it belongs to (`Owners`), and for every mode that *covers* that one, against one that
     doesn't explain it. Bouncing covers sliding: a slide must not let a third mode win against bouncing, or votes go
@@ -158,16 +160,22 @@ def pair_labels(
         Which of `modes` explain it, shape ``(n, len(modes))``.
     modes
         All modes.
-    i, j
-        The pair.
+    pairs
+        The pairs.
     """
-    fits_i, fits_j = (fits[:, modes.index(m)] | (assigned == m) for m in (i, j))
-    for_i, for_j = (
-        (owners == m) | (explained & np.isin(owners, covered_by(assigned, explained)))
-        for m, explained in ((i, fits_i), (j, fits_j))
-    )
-    labels: NDArray[np.int8] = (for_i & ~fits_j).astype(np.int8) - (for_j & ~fits_i)
-    return labels
+
+    @cache
+    def sides(mode: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which examples count for a mode, and which it doesn't explain."""
+        explained = fits[:, modes.index(mode)] | (assigned == mode)
+        counts = (owners == mode) | (explained & np.isin(owners, covered_by(assigned, explained)))
+        return counts, ~explained
+
+    found = {}
+    for i, j in pairs:
+        (for_i, not_i), (for_j, not_j) = sides(i), sides(j)
+        found[i, j] = (for_i & not_j).astype(np.int8) - (for_j & not_i)
+    return found
 
 
 def covered_by(assigned: Any, explained: Any) -> list[int]:

@@ -89,6 +89,17 @@ class Course:
     expert: Callable[[Scene], Any] | None = None
 
 
+_BALL: Final = Course(
+    "ball",
+    "BallGoal",
+    "relgym/BallGoal-v0",
+    repeat=5,
+    limit=100,
+    final=200,
+    agent={"commit": 10},
+    search=TreeSearch(horizon=100, batch=256),
+)
+
 COURSES: Final = {
     course.name: course
     for course in (
@@ -101,25 +112,12 @@ COURSES: Final = {
             search=TreeSearch(horizon=20, batch=512),
             expert=push_knowing,
         ),
-        Course(
-            "ball",
-            "BallGoal",
-            "relgym/BallGoal-v0",
-            repeat=5,
-            limit=100,
-            final=200,
-            agent={"commit": 10},
-            search=TreeSearch(horizon=100, batch=256),
-        ),
-        Course(
-            "materials",
-            "BallGoal, five materials",
-            "relgym/BallGoal-v0",
+        _BALL,
+        replace(
+            _BALL,
+            name="materials",
+            title="BallGoal, five materials",
             arguments={"elasticity": {"floor": 0.9, "ramp": 0.7, "ceiling": 0.6, "box": 0.5, "wall": 0.3}},
-            repeat=5,
-            limit=100,
-            agent={"commit": 10},
-            search=TreeSearch(horizon=100, batch=256),
         ),
     )
 }

@@ -26,6 +26,7 @@ from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger, doubtful
 from relgym.laws.pair import PairFit, fit_pair, outdated
+from relgym.laws.pieces import SUPPORT
 from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
@@ -37,8 +38,6 @@ __all__ = ["LawLearner"]
 
 ESTIMATE_AT = (64, 256, 1024)
 """Numbers of free examples at which the noise is estimated, if the free law doesn't hold exactly."""
-
-FEWEST_CONTACTS = 3
 
 
 class LawLearner:
@@ -405,12 +404,12 @@ class LawLearner:
         """The law of pairs that the contacts kept give, and how bodies share what it says; None if too few do."""
         book, store = self.book, self._store
         if isinstance(store, PushStore):
-            if len(store) < FEWEST_CONTACTS:
+            if len(store) < SUPPORT:
                 return None
             book.inertia = store.inertia(book.free, book.tolerance, rng=self._rng)
             return store.fit(book.free, book.inertia, book.tolerance, rng=self._rng)
         encounters = store.encounters(book)
-        if encounters is None or len(encounters) < FEWEST_CONTACTS:
+        if encounters is None or len(encounters) < SUPPORT:
             return None
         found = fit_pair(encounters, rng=self._rng)
         if len(gone := outdated(encounters, found, rng=self._rng)):

@@ -19,13 +19,13 @@ from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
 from relgym.scene.geometry.vectors import FloatArray
 
-__all__ = ["AxisExamples", "find_pieces", "fitted"]
+__all__ = ["SUPPORT", "AxisExamples", "find_pieces", "fitted"]
 
 ACTING = 10.0
 """A term acts on an example where it contributes more than this many tolerances."""
 
-SUPPORT = 3
-"""Examples that must determine each weight: no two leverage points found a law."""
+SUPPORT = 2
+"""Examples that must show each weight: one that fixes it and one that verifies it."""
 
 SEARCH, DRAWS, MOST_PIECES = 240, 96, 4
 
@@ -143,7 +143,7 @@ def _promising(
 ) -> list[NDArray[np.float64]]:
     """Weights through random samples of as many examples: the set that reproduces most others, if enough."""
     n, p = len(sample), len(columns)
-    if n < p + 2:
+    if n <= p:  # none is left to verify what the others fix
         return []
     x, y = sample.x[:, columns], _response(sample, base)
     picks = _picks(n, p, rng=rng)
@@ -159,7 +159,7 @@ def _promising(
     hits &= np.abs(left) <= EXTRAPOLATED * sample.tolerance
     counts = np.count_nonzero(hits, axis=1)
     best = int(counts.argmax())
-    return [weights[best]] if counts[best] >= p + 2 else []
+    return [weights[best]] if counts[best] > p else []
 
 
 def _picks(n: int, p: int, *, rng: np.random.Generator) -> NDArray[np.intp]:
@@ -243,9 +243,9 @@ def _round(weight: float) -> float:
 
 
 def _determined(piece: Piece, base: bool, members: AxisExamples) -> bool:
-    """Whether several examples determine each weight, and further ones verify the function."""
+    """Whether several examples show each weight, and at least one verifies the function."""
     terms = piece.terms[base:]
-    if len(members) < len(terms) + 2:
+    if len(members) <= len(terms):
         return False
     columns = tuple(members.names.index(name) for name, _ in terms)
     for k, (_, weight) in enumerate(terms):

@@ -60,6 +60,17 @@ def test_a_rare_piece_is_found_among_many_slides(n: int, rng: np.random.Generato
     assert sorted(p.formula(6) for p in found.pieces) == ["-0.9 v", "u"]
 
 
+@pytest.mark.parametrize(("law", "piece", "n"), [("-0.9 * v", "-0.9 v", 2), ("0.3 * v - 0.7 * w", "0.3 v - 0.7 w", 3)])
+def test_an_example_more_than_it_has_numbers_verifies_a_piece(
+    law: str, piece: str, n: int, rng: np.random.Generator
+) -> None:
+    whole = examples(rng, n, law)
+    assert piece in [each.formula(6) for each in find_pieces(whole, [FREE, ZERO], rng=rng)]
+    assert not find_pieces(whole.rows(np.arange(n - 1)), [FREE, ZERO], rng=rng)
+    whole.y[-1] += 1e-6
+    assert piece not in [each.formula(6) for each in find_pieces(whole, [FREE, ZERO], rng=rng)]
+
+
 def test_ties_stay_open(rng: np.random.Generator) -> None:
     tied = examples(rng, 80, "max(u, -0.9 * v)", pull=0.0)  # nothing pulls: u = v
     found = fit_axis(tied, rng=rng)
