@@ -26,7 +26,7 @@ from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger, doubtful
 from relgym.laws.pair import PairFit, fit_pair, outdated
-from relgym.laws.pieces import SUPPORT
+from relgym.laws.pieces import FEWEST
 from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
 from relgym.laws.touching import Cast, Contacts
@@ -404,12 +404,12 @@ class LawLearner:
         """The law of pairs that the contacts kept give, and how bodies share what it says; None if too few do."""
         book, store = self.book, self._store
         if isinstance(store, PushStore):
-            if len(store) < SUPPORT:
+            if len(store) < FEWEST:
                 return None
             book.inertia = store.inertia(book.free, book.tolerance, rng=self._rng)
             return store.fit(book.free, book.inertia, book.tolerance, rng=self._rng)
         encounters = store.encounters(book)
-        if encounters is None or len(encounters) < SUPPORT:
+        if encounters is None or len(encounters) < FEWEST:
             return None
         found = fit_pair(encounters, rng=self._rng)
         if len(gone := outdated(encounters, found, rng=self._rng)):

@@ -6,6 +6,7 @@ selection fails where features are collinear, and in contacts they often are (a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
@@ -19,13 +20,13 @@ from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
 from relgym.scene.geometry.vectors import FloatArray
 
-__all__ = ["SUPPORT", "AxisExamples", "find_pieces", "fitted"]
+__all__ = ["FEWEST", "AxisExamples", "find_pieces", "fitted"]
 
 ACTING = 10.0
 """A term acts on an example where it contributes more than this many tolerances."""
 
-SUPPORT = 2
-"""Examples that must show each weight: one that fixes it and one that verifies it."""
+FEWEST = 2
+"""Contacts that tell a law at least: one that fixes a weight and one that verifies it."""
 
 SEARCH, DRAWS, MOST_PIECES = 240, 96, 4
 
@@ -93,7 +94,7 @@ def find_pieces(examples: AxisExamples, known: list[Piece], *, rng: np.random.Ge
     for piece in known:
         left &= ~examples.explains(piece)
     for _ in range(MOST_PIECES):
-        if left.sum() < SUPPORT:
+        if left.sum() < FEWEST:
             break
         told = _search(examples.rows(left), examples, rng=rng)
         if told is None:
@@ -110,14 +111,16 @@ def _search(part: AxisExamples, everything: AxisExamples, *, rng: np.random.Gene
     if len(part) > SEARCH:
         sample = part.rows(np.sort(rng.choice(len(part), SEARCH, replace=False)))
     best: tuple[float, Piece] | None = None
-    for base, columns in _subsets(part):
-        for weights in _promising(sample, base, columns, rng=rng):
+    every = list(_subsets(part))
+    for base, columns in every:
+        spare = _spare(everything, len(part), len(columns), len(every))
+        for weights in _promising(sample, base, columns, spare, rng=rng):
             rough = _piece(part, base, columns, weights)
             loose = part.near(rough, EXTRAPOLATED)
             least = 0.0 if best is None else best[0] + 1.0
             if EXCEPTION_BITS * int(loose.sum()) <= least:
                 continue  # no fit would save more
-            piece = _refined(rough, loose, base, part)
+            piece = _refined(rough, loose, base, part, spare)
             if piece is None:
                 continue
             saved = EXCEPTION_BITS * int(part.explains(piece).sum())
@@ -138,12 +141,24 @@ def _subsets(examples: AxisExamples) -> Iterator[tuple[bool, tuple[int, ...]]]:
         yield from ((True, columns) for columns in combinations(others, size) if size < 2)
 
 
+def _spare(everything: AxisExamples, n: int, p: int, functions: int) -> int:
+    """Examples that must verify a function of p weights, beside those that fix them.
+
+    So many that neither the choice among functions nor that among n examples, which fix the weights, makes all of them
+    agree by chance, which each of them does once in as many times as the tolerance goes into the velocities. One where
+    states are exact, more through noise.
+    """
+    largest = float(np.abs(everything.y).max(initial=0.0))
+    told = math.log2(max(2.0, largest / max(everything.tolerance, np.finfo(np.float64).tiny)))
+    return max(1, math.ceil((math.log2(functions) + p * math.log2(n)) / told))
+
+
 def _promising(
-    sample: AxisExamples, base: bool, columns: tuple[int, ...], *, rng: np.random.Generator
+    sample: AxisExamples, base: bool, columns: tuple[int, ...], spare: int, *, rng: np.random.Generator
 ) -> list[NDArray[np.float64]]:
     """Weights through random samples of as many examples: the set that reproduces most others, if enough."""
     n, p = len(sample), len(columns)
-    if n <= p:  # none is left to verify what the others fix
+    if n < p + spare:
         return []
     x, y = sample.x[:, columns], _response(sample, base)
     picks = _picks(n, p, rng=rng)
@@ -159,7 +174,7 @@ def _promising(
     hits &= np.abs(left) <= EXTRAPOLATED * sample.tolerance
     counts = np.count_nonzero(hits, axis=1)
     best = int(counts.argmax())
-    return [weights[best]] if counts[best] > p else []
+    return [weights[best]] if counts[best] >= p + spare else []
 
 
 def _picks(n: int, p: int, *, rng: np.random.Generator) -> NDArray[np.intp]:
@@ -203,7 +218,9 @@ def _piece(
     return Piece(((examples.free, 1.0), *terms) if base else tuple(terms))
 
 
-def _refined(piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples) -> Piece | None:
+def _refined(
+    piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples, spare: int
+) -> Piece | None:
     """The piece fitted to what it explains, `loose` at first, as far as that determines it."""
     for _ in range(3):
         if loose.sum() < len(piece.terms) + 1:
@@ -214,7 +231,7 @@ def _refined(piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisE
         loose = again
         if same:
             break
-    return piece if _determined(piece, base, examples.rows(loose)) else None
+    return piece if _determined(piece, base, examples.rows(loose), spare) else None
 
 
 def fitted(piece: Piece, examples: AxisExamples) -> Piece:
@@ -242,17 +259,17 @@ def _round(weight: float) -> float:
     return nearest if abs(nearest) == 1.0 and abs(weight - nearest) <= 1e-9 else weight
 
 
-def _determined(piece: Piece, base: bool, members: AxisExamples) -> bool:
-    """Whether several examples show each weight, and at least one verifies the function."""
+def _determined(piece: Piece, base: bool, members: AxisExamples, spare: int) -> bool:
+    """Whether enough examples verify the function, and each of its weights."""
     terms = piece.terms[base:]
-    if len(members) <= len(terms):
+    if len(members) < len(terms) + spare:
         return False
     columns = tuple(members.names.index(name) for name, _ in terms)
     for k, (_, weight) in enumerate(terms):
         column = members.x[:, columns[k]]
         others = columns[:k] + columns[k + 1 :]
         own = column - least_squares(members.x, column, others, intercept=False).predict(members.x)
-        if np.sort(np.abs(weight * own))[-SUPPORT] <= ACTING * members.tolerance:
+        if np.sort(np.abs(weight * own))[-1 - spare] <= ACTING * members.tolerance:
             return False
     return True
 

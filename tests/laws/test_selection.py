@@ -60,7 +60,9 @@ def test_a_rare_piece_is_found_among_many_slides(n: int, rng: np.random.Generato
     assert sorted(p.formula(6) for p in found.pieces) == ["-0.9 v", "u"]
 
 
-@pytest.mark.parametrize(("law", "piece", "n"), [("-0.9 * v", "-0.9 v", 2), ("0.3 * v - 0.7 * w", "0.3 v - 0.7 w", 3)])
+@pytest.mark.parametrize(
+    ("law", "piece", "n"), [("-0.9 * v", "-0.9 v", 2), ("0.3 * v - 0.7 * w", "0.3 v - 0.7 w", 3)]
+)
 def test_an_example_more_than_it_has_numbers_verifies_a_piece(
     law: str, piece: str, n: int, rng: np.random.Generator
 ) -> None:
@@ -69,6 +71,17 @@ def test_an_example_more_than_it_has_numbers_verifies_a_piece(
     assert not find_pieces(whole.rows(np.arange(n - 1)), [FREE, ZERO], rng=rng)
     whole.y[-1] += 1e-6
     assert piece not in [each.formula(6) for each in find_pieces(whole, [FREE, ZERO], rng=rng)]
+
+
+@pytest.mark.parametrize(("noise", "n", "found"), [(1e-9, 2, True), (1e-2, 2, False), (1e-2, 4, True)])
+def test_through_noise_it_takes_more_of_them(
+    noise: float, n: int, found: bool, rng: np.random.Generator
+) -> None:
+    v = np.linspace(-1.0, -0.7, n)
+    x = np.stack([v - 0.01, v, rng.normal(size=n), np.full(n, 0.7), np.ones(n)], axis=1)
+    y = -0.9 * v + noise * rng.uniform(-1.0, 1.0, n)
+    pieces = find_pieces(AxisExamples(NAMES, x, y, "u", 6.0 * noise), [FREE, ZERO], rng=rng)
+    assert any(set(dict(piece.terms)) & {"u", "v"} for piece in pieces) == found
 
 
 def test_ties_stay_open(rng: np.random.Generator) -> None:
