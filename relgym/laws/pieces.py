@@ -142,11 +142,11 @@ def _subsets(examples: AxisExamples) -> Iterator[tuple[bool, tuple[int, ...]]]:
 
 
 def _spare(everything: AxisExamples, n: int, p: int, functions: int) -> int:
-    """Examples that must verify a function of p weights, beside those that fix them.
+    """Examples that must verify a function of p weights, beside the p that fix them.
 
-    So many that neither the choice among functions nor that among n examples, which fix the weights, makes all of them
-    agree by chance, which each of them does once in as many times as the tolerance goes into the velocities. One where
-    states are exact, more through noise.
+    By chance an example agrees with probability tolerance / largest velocity. A function and the examples that fix it,
+    p of n, are chosen in at most ``functions * n**p`` ways. So many must agree that less than one of these is expected
+    to get there by chance: one where states are exact, more through noise.
     """
     largest = float(np.abs(everything.y).max(initial=0.0))
     told = math.log2(max(2.0, largest / max(everything.tolerance, np.finfo(np.float64).tiny)))

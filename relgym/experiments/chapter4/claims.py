@@ -1060,8 +1060,8 @@ _NOISE: Final = (
     *((1e-8, true) for true in (1e-20, 1e-10, 1e-5)),
     (1e-5, 1e-15),
 )
-"""Variances, expected and true, that are measured of those that claims speak of: where there is more noise than is
-expected, a training takes a quarter of an hour or more."""
+"""Variances, expected and true, that claims speak of: where there is more noise than is expected, a training may take
+an hour."""
 
 
 def plan(protocol: Protocol) -> Plan:
