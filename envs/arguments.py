@@ -212,19 +212,35 @@ def checked_actions(space: spaces.Space[Any], actions: Any, count: int) -> Any:
             raise ActionError(f"expected {count} actions of {space}, got {actions!r}")
         return array
     try:
-        array = np.asarray(actions, dtype=np.float64)
+        array = np.array(actions, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise ActionError(f"expected numbers of shape {(count, *space.shape)}, got {actions!r}") from None
     if array.shape != (count, *space.shape):
         raise ActionError(f"expected actions of shape {(count, *space.shape)}, got shape {array.shape}")
-    slack = 1e-6 * np.maximum(1.0, np.abs(space.high))
-    legal_ones = (array >= space.low - slack) & (array <= space.high + slack)
+    low, high = _limits(space)
+    if ((array >= low) & (array <= high)).all():
+        return array  # most are, and clipping takes longer
+    slack = 1e-6 * np.maximum(1.0, np.abs(high))
+    legal_ones = (array >= low - slack) & (array <= high + slack)
     if not legal_ones.all():
         row = int(np.argwhere(~legal_ones)[0][0])
         raise ActionError(
             f"action {row} of {count} lies outside [{space.low}, {space.high}]: {array[row]}; clip or rescale it"
         )
-    return np.clip(array, space.low, space.high)
+    return np.clip(array, low, high)
+
+
+def _limits(space: spaces.Box) -> tuple[Any, Any]:
+    """Smallest and largest action; numbers where all are the same: those are compared in a fraction of the time."""
+    known = _LIMITS.get(id(space))
+    if known is None or known[0] is not space:
+        if len(_LIMITS) >= _KEPT:
+            _LIMITS.clear()
+        low, high = space.low, space.high
+        if low.size and (low == low.flat[0]).all() and (high == high.flat[0]).all():
+            low, high = low.flat[0], high.flat[0]
+        known = _LIMITS[id(space)] = space, low, high
+    return known[1:]
 
 
 def _batched(space: spaces.Space[Any], count: int) -> spaces.Space[Any]:
@@ -238,6 +254,7 @@ def _batched(space: spaces.Space[Any], count: int) -> spaces.Space[Any]:
 
 
 _KEPT = 64
+_LIMITS: dict[int, tuple[spaces.Box, Any, Any]] = {}
 _BATCHED: dict[int, tuple[spaces.Space[Any], int, spaces.Space[Any]]] = {}
 
 

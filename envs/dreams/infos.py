@@ -29,10 +29,11 @@ def told_of(step: DreamStep, stepped: Stepped, going: NDArray[np.bool_] | None) 
     infos: dict[str, Any] = {}
     count = len(stepped.truncated)
     if stepped.truncated.any():
-        reasons, names = (np.full(count, None, dtype=object) for _ in range(2))
+        reasons, names = (np.empty(count, dtype=object) for _ in range(2))  # of None
         out = stepped.causes == _HORIZON
-        reasons[out], names[out] = step.out_of_time, _NAMES[_HORIZON]
-        rows = np.flatnonzero(stepped.truncated & ~out)
+        if out.any():
+            reasons[out], names[out] = step.out_of_time, _NAMES[_HORIZON]
+        rows = (stepped.truncated & ~out).nonzero()[0]
         reasons[rows] = step.reasons(stepped, rows)
         names[rows] = [_NAMES[cause] for cause in stepped.causes[rows].tolist()]
         mask = stepped.truncated.copy()

@@ -54,11 +54,17 @@ class Drawn:
             return self
         return Drawn(np.array([vector_of(scene) for scene in self._scenes]))
 
-    def __call__(self, rng: np.random.Generator, count: int) -> Float2D:
-        """State vectors of so many first scenes."""
+    @property
+    def vectors(self) -> Float2D:
+        """State vectors of all that may be drawn."""
         if self._vectors is None:
             raise ConfigError("the scenes hold different objects, or the same ones in another order")
-        drawn: Float2D = self._vectors[rng.integers(len(self._vectors), size=count)]
+        return self._vectors
+
+    def __call__(self, rng: np.random.Generator, count: int) -> Float2D:
+        """State vectors of so many first scenes."""
+        every = self.vectors
+        drawn: Float2D = every[rng.integers(len(every), size=count)]
         return drawn
 
 

@@ -119,20 +119,21 @@ class DreamStep:
         why = causes(prediction, inside, self.min_margin, self.evaluator.overruled)
         if self.guesses:
             why[inside & np.isfinite(after).all(axis=1)] = -1
-        if among is not None:
-            why[~among] = _HORIZON  # neither followed nor evaluated
+        others = None if among is None else (~among).nonzero()[0]
+        if others is not None:
+            why[others] = _HORIZON  # neither followed nor evaluated
         rewards, ended, success = self._evaluated(before, actions, after, why < 0)
         if (doubted := np.isnan(rewards)).any():
             why[doubted], rewards[doubted], ended[doubted] = _NO_REWARD, 0.0, False
         if self.horizon is not None:
-            why[(why < 0) & (steps >= self.horizon)] = _HORIZON
+            why[((why < 0) & (steps >= self.horizon)).nonzero()[0]] = _HORIZON
         lost = (why >= 0) & (why != _HORIZON)
-        if among is not None:
-            why[~among] = -1
+        if others is not None:
+            why[others] = -1
         followed = after
-        if lost.any():
+        if len(rows := lost.nonzero()[0]):
             followed = after.copy()
-            followed[lost] = before[lost]
+            followed[rows] = before[rows]
         if len(self.setting.brought):
             followed = after.copy() if followed is after else followed
             followed[:, self.setting.brought] = 0.0  # what the next step will bring isn't known
@@ -170,20 +171,26 @@ class DreamStep:
 
     def reasons(self, stepped: Stepped, rows: NDArray[np.intp]) -> list[str]:
         """Why some dreams were truncated: for each a sentence that names objects and properties."""
-        left = self.setting.shown.outside(self.setting.layout, stepped.foreseen[rows])
-        found = []
-        for row, beyond in zip(rows.tolist(), left, strict=True):
+        found, left = [""] * len(rows), []
+        for k, row in enumerate(rows.tolist()):
             cause = int(stepped.causes[row])
             if cause == _HORIZON:
-                found.append(self.out_of_time)
+                found[k] = self.out_of_time
             elif cause == _NO_REWARD:
-                found.append(Cause.NO_REWARD.value)
+                found[k] = Cause.NO_REWARD.value
             elif cause == _LEFT:
-                found.append(beyond)
+                left.append(k)
             else:
                 parts = parts_of_row(stepped.prediction, row)
                 told = explained(parts, self.min_margin, self.evaluator.overruled)
-                found.append(beyond if told is None else told[1])
+                if told is None:
+                    left.append(k)
+                else:
+                    found[k] = told[1]
+        if left:
+            beyond = self.setting.shown.outside(self.setting.layout, stepped.foreseen[rows[left]])
+            for k, sentence in zip(left, beyond, strict=True):
+                found[k] = sentence
         return found
 
 

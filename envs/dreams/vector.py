@@ -167,6 +167,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         )
         start = checked_function("start", start, "random generator", "count")
         self._start = start.fit(place.fitted_vector) if isinstance(start, Drawn) else start
+        self._known: Drawn | None = None  # what is drawn from, once all of it is known to be allowed
         self._vectors: Float2D | None = None
         self._steps = np.zeros(self.num_envs, dtype=np.int64)
         self._over = np.zeros(self.num_envs, dtype=np.bool_)
@@ -288,12 +289,19 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if seed is not None:
             checked_count("seed", seed, 0, 2**62)
         place, count = self._setting, len(rows)
+        if self._known is not None and not options:
+            return self._known(self.np_random, count)
         if "scene" in options or "scenes" in options or self._start is not None or place.world is None:
             check_options(options, ("reset_mask", "scene", "scenes"))
         if "scenes" in options:
             return self._checked_first(options["scenes"], count, "options['scenes']")
         if "scene" in options:
             return np.repeat(place.fitted_vector(options["scene"])[None], count, axis=0)
+        if isinstance(self._start, Drawn):
+            if self._known is None:
+                every = self._start.vectors
+                self._known = Drawn(self._checked_first(every, len(every), "start", each="scene"))
+            return self._known(self.np_random, count)
         if self._start is not None:
             return self._checked_first(self._start(self.np_random, count), count, "start")
         if place.world is not None:
@@ -302,7 +310,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         drawn: Float2D = place.pool_vectors[self.np_random.integers(len(place.pool), size=count)]
         return drawn
 
-    def _checked_first(self, given: Any, count: int, what: str) -> Float2D:
+    def _checked_first(self, given: Any, count: int, what: str, *, each: str = "dream") -> Float2D:
         place = self._setting
         if not isinstance(given, np.ndarray):
             if not isinstance(given, Iterable):
@@ -320,7 +328,7 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if not (inside := place.shown.inside(vectors)).all():  # false for NaN, too
             row = int(np.flatnonzero(~inside)[0])
             (left,) = place.shown.outside(place.layout, vectors[row : row + 1])
-            raise ObservationError(f"{what}: dream {row} can't begin here: {left}")
+            raise ObservationError(f"{what}: {each} {row} can't begin here: {left}")
         return vectors
 
     def _begin(self, rows: _Rows, first: Float2D, *, told: bool = True) -> None:

@@ -307,7 +307,7 @@ class Runner:
         n, count = shape = len(vectors), len(self._keys)
         following, outcomes = np.empty(vectors.shape), np.empty(shape, dtype=np.int8)
         modes, margins = np.empty(shape, dtype=np.int64), np.empty(shape)
-        sure = np.full((2, n, count), np.nan)
+        sure = np.empty((2, n, count)) if settling else np.full((2, n, count), np.nan)
         told = outcomes, modes, margins, sure
         with self._turn:
             if on_card:

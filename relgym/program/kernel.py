@@ -809,40 +809,47 @@ def closing(s, a, b):
 
 
 def sides(s, a, b):
-    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes, touching aside.
+    """How body a lies to b, and b to a: bits of the kinds of relations between bounding boxes.
 
-    And the boxes' gap.
+    Those aside that take touching, on top among them. And the boxes' gap.
     """
     one, there, back, beside = np.int64(1), np.int64(0), np.int64(0), np.int64(0)
-    over = under = one
     gap = -math.inf
     for d in range(s.code[DIMENSIONS]):
         low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
         low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
         offset = s.body[a, BX + d] - s.body[b, BX + d]
-        wide_a, wide_b = high_a - low_a, high_b - low_b
-        margin = -(ALIGN_MARGIN * min(wide_a, wide_b))
+        margin = -(ALIGN_MARGIN * min(high_a - low_a, high_b - low_b))
         ahead, behind = (low_b - high_a) - offset, (low_a - high_b) + offset
         gap = max(gap, max(ahead, behind))
         below, above = np.int64(ahead >= margin), np.int64(behind >= margin)
         there |= below << (5 + d) | above << (8 + d)
         back |= below << (8 + d) | above << (5 + d)
         beside |= (one ^ (below | above)) << (11 + d)
-        if d == s.code[UP]:
-            over, under = over & above, under & below
-        else:
-            shared = min(high_a + offset, high_b) - max(low_a + offset, low_b)
-            over &= np.int64(shared >= MIN_OVERLAP * wide_a)
-            shared = min(high_b - offset, high_a) - max(low_b - offset, low_a)
-            under &= np.int64(shared >= MIN_OVERLAP * wide_b)
-    there |= over << 3 | np.int64(SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]) << 4
-    back |= under << 3 | np.int64(SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]) << 4
+    there |= np.int64(SIZE_RATIO * s.body[a, WHOLE] < s.body[b, WHOLE]) << 4
+    back |= np.int64(SIZE_RATIO * s.body[b, WHOLE] < s.body[a, WHOLE]) << 4
     return there | beside, back | beside, gap
 
 
-def fastest(s, a, b):
-    """Whether a approaches no other body faster than b, which it approaches."""
-    own = closing(s, a, b)
+def on_top(s, a, b, there):
+    """Which of two bodies that touch lies on top of the other, a (1), b (2) or neither; `there`: what `sides` says."""
+    over, under = there >> (8 + s.code[UP]) & 1, there >> (5 + s.code[UP]) & 1
+    if over | under == 0:
+        return np.int64(0)
+    for d in range(s.code[DIMENSIONS]):
+        if d != s.code[UP]:
+            low_a, high_a = s.body[a, LOW_X + d], s.body[a, HIGH_X + d]
+            low_b, high_b = s.body[b, LOW_X + d], s.body[b, HIGH_X + d]
+            offset = s.body[a, BX + d] - s.body[b, BX + d]
+            shared = min(high_a + offset, high_b) - max(low_a + offset, low_b)
+            over &= np.int64(shared >= MIN_OVERLAP * (high_a - low_a))
+            shared = min(high_b - offset, high_a) - max(low_b - offset, low_a)
+            under &= np.int64(shared >= MIN_OVERLAP * (high_b - low_b))
+    return over | under << 1
+
+
+def fastest(s, a, b, own):
+    """Whether a approaches no other body faster than b, which it approaches at such a speed."""
     slack = limit(s, min(a, b), max(a, b), PART, SPEED)
     for k in range(s.code[BODIES]):
         if k != a and k != b and own > closing(s, a, k) + slack:
@@ -877,14 +884,14 @@ def relate(s, among):
             else:
                 near = touch(s, a, b)
             if near:
-                there, back = there | 4, back | 4
-                if asked & 3 and closing(s, a, b) < math.inf:
+                lying = on_top(s, a, b, there) if asked & 8 else np.int64(0)
+                there, back = there | 4 | (lying & 1) << 3, back | 4 | (lying >> 1) << 3
+                speed = closing(s, a, b) if asked & 3 else math.inf
+                if speed < math.inf:
                     there, back = there | 1, back | 1
                     if asked & 2:
-                        there |= 2 if fastest(s, a, b) else 0
-                        back |= 2 if fastest(s, b, a) else 0
-            else:
-                there, back = there & ~(one << 3), back & ~(one << 3)
+                        there |= 2 if fastest(s, a, b, speed) else 0
+                        back |= 2 if fastest(s, b, a, speed) else 0
             there, back = there & asked, back & asked
             s.kinds[a, b], s.kinds[b, a] = there, back
             state = (state ^ np.uint64((there << 16) + back + 1)) * MIX_A
