@@ -1,4 +1,7 @@
-"""How fast dreams are: 1,024 of them stepped at once by arrays, and as many envs of the engine one after another."""
+"""How fast dreams are: 1,024 of them stepped at once by arrays, and as many envs of the engine one after another.
+
+Both are timed through whole episodes of the same length, the step that begins the next ones included.
+"""
 
 from __future__ import annotations
 
@@ -18,13 +21,16 @@ from relgym.model.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
 
-__all__ = ["COUNT", "WORLDS", "dreams", "engine", "rate", "speed"]
+__all__ = ["COUNT", "HORIZONS", "WORLDS", "dreams", "engine", "rate", "speed"]
 
 COUNT: Final = 1024
 """Scenes at once."""
 
 WORLDS: Final = ("truck", "ball by laws", "ball by modes")
 """A truck with three boxes; a ball among six bodies."""
+
+HORIZONS: Final = {"truck": 20, "ball by laws": 200, "ball by modes": 200}
+"""Steps that an episode lasts."""
 
 _FRAMES: Final = {"ball by laws": "auto", "ball by modes": "world"}
 _TRUCK: Final = ("relgym/TruckPush-v0", {"task": None})
@@ -39,11 +45,15 @@ def dreams(world: str) -> LearnedModelVectorEnv:
 def engine(world: str) -> SyncVectorEnv:
     """As many real envs."""
     env_id, arguments = _TRUCK if world == "truck" else _BALL
-    return SyncVectorEnv([lambda: gym.make(env_id, **arguments) for _ in range(COUNT)])
+    limit = HORIZONS[world]
+    return SyncVectorEnv([lambda: gym.make(env_id, limit, **arguments) for _ in range(COUNT)])
 
 
 def rate(envs: Any, *, rounds: int, steps: int) -> float:
-    """Env-steps per second of processor time, the median of some rounds of steps."""
+    """Env-steps per second of processor time, the median of some rounds of steps.
+
+    Rounds of a step more than an episode has are each of one episode: the first step of the next one resets.
+    """
     KERNEL.load()
     envs.reset(seed=0)
     envs.action_space.seed(0)
@@ -61,8 +71,8 @@ def rate(envs: Any, *, rounds: int, steps: int) -> float:
 def speed(*, world: str) -> dict[str, float]:
     """Env-steps per second of dreams and of the engine, as a task for the store of results."""
     return {
-        "dreams": rate(dreams(world), rounds=5, steps=100),
-        "engine": rate(engine(world), rounds=5, steps=1),
+        "dreams": rate(dreams(world), rounds=15, steps=HORIZONS[world] + 1),
+        "engine": rate(engine(world), rounds=3, steps=HORIZONS[world] + 1),
     }
 
 
@@ -103,7 +113,7 @@ def _truck_dreams() -> LearnedModelVectorEnv:
             vectors.append(like.get_wrapper_attr("scene").vector)
             like.step(like.action_space.sample())
     start = drawn_from(np.array(vectors))
-    return LearnedModelVectorEnv(_truck_model(), COUNT, like=like, start=start, horizon=20)
+    return LearnedModelVectorEnv(_truck_model(), COUNT, like=like, start=start, horizon=HORIZONS["truck"])
 
 
 def _ball_dreams(frames: str) -> LearnedModelVectorEnv:
@@ -111,4 +121,6 @@ def _ball_dreams(frames: str) -> LearnedModelVectorEnv:
     episodes = ball_episodes(1, seed=TUNING_TEST_SEED, episodes=40, test=True)
     start = drawn_from(np.concatenate([episode.vectors[:-1] for episode in episodes]))
     like = gym.make(_BALL[0])
-    return LearnedModelVectorEnv(_ball_model(frames), COUNT, like=like, start=start, horizon=200)
+    return LearnedModelVectorEnv(
+        _ball_model(frames), COUNT, like=like, start=start, horizon=HORIZONS["ball by laws"]
+    )

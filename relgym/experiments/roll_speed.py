@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from relgym.errors import ConfigError
-from relgym.experiments.dyna_speed import WORLDS, dreams, engine, rate
+from relgym.experiments.dyna_speed import HORIZONS, WORLDS, dreams, engine, rate
 from relgym.model.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float2D, SceneLayout
@@ -69,7 +69,7 @@ def main() -> None:
     print(f"{'million steps a second':<24}{'engine':>8}{'one core':>10}{'card':>8}")
     for world in WORLDS:
         core, card, why = speeds(world)
-        own = rate(engine(world), rounds=3, steps=1)
+        own = rate(engine(world), rounds=3, steps=HORIZONS[world] + 1)
         told = f"{card / 1e6:>8.1f}" if card == card else "  not measured: " + why
         print(f"{world:<24}{own / 1e6:>8.3f}{core / 1e6:>10.1f}{told}", flush=True)
 
