@@ -27,8 +27,8 @@ Entry: TypeAlias = tuple[str, tuple[Any, ...]]
 STEPS = 1_000
 """A checkpoint is taken after so many steps at the latest: a rollback takes as long as so many steps."""
 
-NUMBERS = 1_000_000
-"""... or after steps of so many numbers together: of large scenes fewer are kept."""
+NUMBERS = 4_000_000
+"""... or after steps of so many numbers together, 32 MB: of large scenes fewer are kept."""
 
 LARGE = 1 << 14
 """Arrays of so many bytes and more are copied beside what is serialised."""

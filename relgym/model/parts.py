@@ -123,7 +123,8 @@ class Parts:
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
         self._kin: dict[int, SceneSchema] = {}
-        self._fine: Scene | None = None
+        self._fine: Scene | None = None  # the last one whose numbers were found finite
+        self._checked: Scene | None = None  # the last one that passed `check`
         self._known: dict[int, SceneLayout] = {}
         self._answers: dict[int, tuple[SceneLayout, dict[tuple[str, str], Answer]]] = {}
         self._undiscovered: dict[int, tuple[SceneLayout, list[tuple[Target, int, int]]]] = {}
@@ -132,7 +133,7 @@ class Parts:
 
     def __getstate__(self) -> dict[str, Any]:
         by_identity = ("_kin", "_known", "_answers", "_undiscovered")  # a copy's objects are others
-        return self.__dict__ | {name: {} for name in by_identity} | {"_fine": None}
+        return self.__dict__ | {name: {} for name in by_identity} | {"_fine": None, "_checked": None}
 
     def admits(self, scene: object) -> bool:
         """Whether a scene is known to follow the schema and holds finite numbers; sizes aren't asked."""
@@ -167,6 +168,8 @@ class Parts:
 
         `ShapeError` where a body can't be: an extent isn't positive, or a sphere isn't round.
         """
+        if scene is self._checked:
+            return
         if not isinstance(scene, Scene):
             raise ObservationError(
                 f"expected a Scene, got {type(scene).__name__}; of an observation and an action a learner's "
@@ -185,6 +188,7 @@ class Parts:
             schema.scene(scene.values())  # raises, naming object and property
         if scene.layout.bodies:
             check_sizes(scene)
+        self._checked = scene
 
     def checked_batch(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
         """State vectors as contiguous float64; `ObservationError` for other types or width, NaN or infinity."""
