@@ -7,7 +7,7 @@ import math
 import reprlib
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import gymnasium as gym
 import numpy as np
@@ -236,7 +236,7 @@ def _limits(space: spaces.Box) -> tuple[Any, Any]:
     if known is None or known[0] is not space:
         if len(_LIMITS) >= _KEPT:
             _LIMITS.clear()
-        low, high = space.low, space.high
+        low, high = cast(Any, (space.low, space.high))
         if low.size and (low == low.flat[0]).all() and (high == high.flat[0]).all():
             low, high = low.flat[0], high.flat[0]
         known = _LIMITS[id(space)] = space, low, high

@@ -22,7 +22,7 @@ from relgym.numeric.changes import changed_at
 from relgym.planning.doubts import DoubtedTask, OptimisticTask
 from relgym.planning.exploration import Coverage, Familiar, NoTask, relative_columns
 from relgym.planning.planner import Planner, PlannerState, States
-from relgym.planning.review import learned_again, length, missed, mixed, right
+from relgym.planning.review import learned_again, length, missed, mixed, off_by, right
 from relgym.planning.rollouts import Objective
 from relgym.planning.sequences import Search
 from relgym.planning.simulators import ModelSimulator, Simulator
@@ -43,6 +43,10 @@ __all__ = ["PlanningAgent"]
 _GROWTH: Final = 1.1
 """Between two reviews the agent's experience grows by this factor: all of them together cost as much as to learn from
 everything some ten times, for each order, but they only take place while the model is wrong."""
+
+_IN_VAIN: Final = 2.0
+"""The same after a review whose best model still misses more than half of what was seen: no exact law of the forms that
+are looked for covers it, and as many orders of a few more steps won't find one."""
 
 _ORDERS: Final = 6
 """Random orders that a review tries at most: of few steps one may miss what another finds. Two that come to the same
@@ -180,10 +184,11 @@ class PlanningAgent:
         if model is None:
             model = WorldModel(self._recorder.view.schema, config)
         check_model(model, Lens(self._recorder))
+        self._matters = getattr(model, "config", ModelConfig()).claim_error
         options = DynaConfig(shuffle=0, seed=checked_count("seed", seed, 0, 2**31))
         if isinstance(model, WorldModel):  # reviews replace it
             options = replace(options, renew=0)
-        self.trainer = ModelTrainer(model, _task(task, env), options)
+        self.trainer = ModelTrainer(model, _task(task, env), options, self._recorder.view.precision)
         adopt = getattr(self.trainer.reward_model, "adopt", None)
         if adopt is not None:  # it is asked about actions as the env understands them
             adopt(Lens(self._recorder).acting)
@@ -199,9 +204,12 @@ class PlanningAgent:
         self._history: deque[Experience] = deque(maxlen=_REMEMBERED)
         self._episodes: deque[int] = deque(maxlen=_REMEMBERED)
         self._begun = 0
-        self._wrong: deque[bool] = deque(maxlen=_REMEMBERED)  # since the model took over
+        self._wrong: deque[bool] = deque(maxlen=_REMEMBERED)  # at all, since the model took over
+        self._off: deque[bool] = deque(maxlen=_LATEST)  # by more than matters
+        self._exact = isinstance(model, WorldModel)  # whether its laws are, as far as is known
         self._at_random = True
         self._next_review = self._next_after_change = _FIRST_REVIEW
+        self._next_again = 0  # before that no other order is tried
         self._size = Spread()
         self._has_task = task is not None
         spec = env.spec
@@ -228,10 +236,12 @@ class PlanningAgent:
     def doubt(self) -> float:
         """Share of the latest real steps of which the model predicted the next scene wrongly, or not at all.
 
+        Where no exact laws are found (`_review`), and of models that have none, values count, and only what is off by
+        more than a share of what usually changes (`ModelConfig.claim_error`): they will always be a little off.
         With a task so many episodes are spent on random actions: a plan in a model that is wrong is no better, and
         teaches less.
         """
-        latest = list(self._wrong)[-_LATEST:]
+        latest = list(self._wrong)[-_LATEST:] if self._exact else self._off
         return sum(latest) / len(latest) if latest else 1.0
 
     def planner(self, *, explores: bool = False) -> Planner:
@@ -399,6 +409,7 @@ class PlanningAgent:
             self._layout = after.layout
         # A model that has found no target yet names no part.
         self._wrong.append(bool(self.trainer.wrong) or not self.model.targets)
+        self._off.append(self._wrong[-1] and self.trainer.error > self._matters)
         if after.layout == self._layout:
             self.coverage.add(
                 after.vector,
@@ -430,11 +441,15 @@ class PlanningAgent:
         """Learn again from what was seen if the model was wrong lately; go on with the one that is wrong less often."""
         known = min(self.model.seen, self.steps) if self._replaceable else self.steps
         self._next_review = self.steps + int(known * _GROWTH) - known + 1
-        if self._replaceable and self.doubt:
+        if self._replaceable and any(list(self._wrong)[-_LATEST:]) and self.steps >= self._next_again:
             seen, episodes = self._learned_from()
-            own = missed(self.model, seen, episodes) + length(self.model)
-            if (best := self._learned_again(seen, episodes, own)[0]) is not None:
+            left = missed(self.model, seen, episodes)
+            if (best := self._learned_again(seen, episodes, left + length(self.model))[0]) is not None:
                 self._adopt(best, seen, episodes)
+                left = missed(best, seen, episodes)
+            self._exact = 2 * left <= len(seen)
+            if not self._exact:
+                self._next_again = self.steps + int(known * _IN_VAIN) - known
         if isinstance(self.trainer.reward_model, LearnedRewardModel):
             self._review_task(self.trainer.reward_model)
 
@@ -508,6 +523,9 @@ class PlanningAgent:
         tested = learned_again(self.model, seen[:-count], rng=self._rng, episodes=episodes[:-count])
         parts = right(best, seen[-2 * count : -count]), right(tested, seen[-count:])
         self._wrong = deque((~np.concatenate(parts)).tolist(), maxlen=_REMEMBERED)
+        ratio = self.trainer.acceptance.ratio
+        off = off_by(best, seen[-2 * count : -count], ratio), off_by(tested, seen[-count:], ratio)
+        self._off = deque((np.concatenate(off) > self._matters).tolist(), maxlen=_LATEST)
 
     def _review_task(self, own: LearnedRewardModel) -> None:
         """The same for reward and end."""

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.model.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 
-__all__ = ["learned_again", "length", "missed", "mixed", "right"]
+__all__ = ["learned_again", "length", "missed", "mixed", "off_by", "right"]
 
 _LITERALS: Final = 5
 """So many literals of clauses take as many bits as a number: some four each (which relation, of which objects), and a
@@ -39,6 +40,29 @@ def right(
     """
     claimed, off = _off(model, transitions, tolerance)
     return claimed & np.array([not len(rest) for rest in off], dtype=np.bool_)
+
+
+def off_by(
+    model: WorldModel, transitions: Sequence[Transition], ratio: Callable[[tuple[str, str], float], float]
+) -> NDArray[np.float64]:
+    """How far a model's values are off, those that it only guesses included, as the largest ratio of a step.
+
+    Parameters
+    ----------
+    model, transitions
+        As for `right`.
+    ratio
+        Of (type, property) and how far a value is off; see `relgym.wrappers.dyna.acceptance.ModelAcceptance.ratio`.
+
+    Returns
+    -------
+    Shape ``(n,)``.
+    """
+    found = np.zeros(len(transitions))
+    for rows, _, parts, off, _ in _compared(model, transitions):
+        for k, row in zip(rows, off, strict=True):
+            found[k] = max(map(ratio, parts, row.tolist()), default=1.0)
+    return found
 
 
 def missed(
@@ -71,23 +95,7 @@ def _off(
     """Which of n transitions a model claims to predict, and by how much it is off, empty where it is right."""
     claimed = np.zeros(len(transitions), dtype=np.bool_)
     found = [b""] * len(transitions)
-    order = sorted(range(len(transitions)), key=lambda k: _layouts(transitions[k])[0].names)
-    for _, group in groupby(order, key=lambda k: _layouts(transitions[k])):
-        rows = list(group)
-        before, after = _layouts(transitions[rows[0]])
-        told = model.predict_batch(before, np.stack([transitions[k].before.vector for k in rows]))
-        seen = np.stack([transitions[k].after.vector for k in rows])
-        parts = [
-            (
-                before.column(before.index(name), target.property),
-                after.column(after.index(name), target.property),
-            )
-            for target in model.targets
-            for name in (before.names[k] for k in before.of_type(target.type))
-            if name in after.names
-        ]
-        real = seen[:, [column for _, column in parts]]
-        off = real - told.vectors[:, [column for column, _ in parts]]
+    for rows, told, _, off, real in _compared(model, transitions):
         size = np.maximum(1.0, np.abs(real))
         # A hundred tolerances apart errors aren't the same one, rounded.
         step = 100.0 * tolerance * size.max(axis=0, initial=1.0)
@@ -96,6 +104,33 @@ def _off(
         for k, rest in zip(rows, off, strict=True):
             found[k] = rest.tobytes() if rest.any() else b""
     return claimed, found
+
+
+def _compared(
+    model: WorldModel, transitions: Sequence[Transition]
+) -> Iterator[
+    tuple[list[int], BatchPrediction, list[tuple[str, str]], NDArray[np.float64], NDArray[np.float64]]
+]:
+    """Transitions of one layout after the other: which, what is predicted, and of all targets kinds, errors, values."""
+    order = sorted(range(len(transitions)), key=lambda k: _layouts(transitions[k])[0].names)
+    for _, group in groupby(order, key=lambda k: _layouts(transitions[k])):
+        rows = list(group)
+        before, after = _layouts(transitions[rows[0]])
+        told = model.predict_batch(before, np.stack([transitions[k].before.vector for k in rows]))
+        seen = np.stack([transitions[k].after.vector for k in rows])
+        parts = [
+            (
+                (target.type, target.property),
+                before.column(before.index(name), target.property),
+                after.column(after.index(name), target.property),
+            )
+            for target in model.targets
+            for name in (before.names[k] for k in before.of_type(target.type))
+            if name in after.names
+        ]
+        real = seen[:, [column for _, _, column in parts]]
+        off = real - told.vectors[:, [column for _, column, _ in parts]]
+        yield rows, told, [key for key, _, _ in parts], off, real
 
 
 def length(model: WorldModel) -> float:

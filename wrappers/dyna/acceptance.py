@@ -102,14 +102,15 @@ class ModelAcceptance:
             self._spreads.setdefault(key, Spread()).add(change)
         self._predicted.append(bool(verdict.residuals))
         if verdict.residuals:
-            self._errors.append(max(self._ratio(key, off) for key, off in verdict.residuals.items()))
+            self._errors.append(max(self.ratio(key, off) for key, off in verdict.residuals.items()))
         self._decide()
 
-    def _ratio(self, key: Key, off: float) -> float:
+    def ratio(self, key: Key, off: float) -> float:
+        """How far a prediction was off by how much the property usually changes, at most 1; of NaN 1."""
         scale = self._spreads[key].scale if key in self._spreads else 0.0
         if scale == 0.0:  # it never changed: any error counts as 1
             return float(abs(off) > 1e-9)
-        return min(1.0, abs(off) / scale)
+        return min(1.0, abs(off) / scale) if off == off else 1.0
 
     def _decide(self) -> None:
         enough = len(self._errors) >= self.least

@@ -8,6 +8,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from relgym.envs.arguments import checked_least
 from relgym.envs.dreams.setting import check_knowledge
 from relgym.errors import ConfigError
 from relgym.model.motion import possible_targets
@@ -51,6 +52,8 @@ class ModelTrainer:
         ``"learned"``: as for `Dyna`.
     config
         Free parameters.
+    precision
+        Relative precision of what is observed (`relgym.envs.views.View.precision`): what is off by no more isn't wrong.
 
     Raises
     ------
@@ -71,6 +74,9 @@ class ModelTrainer:
         Of the last step: how far the prediction was off, that of reward and end included.
     wrong : tuple of (object, property)
         What the model said nothing or something wrong of in the last step.
+    error : float
+        How far values of the last step were off, guesses included, by how much such properties usually change: the
+        largest ratio, at most 1. 1 where there was no value, or nothing is known to change.
     """
 
     def __init__(
@@ -78,8 +84,10 @@ class ModelTrainer:
         model: DreamModel,
         reward_model: RewardModel | Literal["learned"],
         config: DynaConfig | None = None,
+        precision: float = 0.0,
     ) -> None:
         self._config = checked_config(config)
+        self._precision = checked_least("precision", precision, 0.0)
         self._trainee = _Trainee(model, self._config, np.random.default_rng([self._config.seed, 1]))
         self._replacement: _Trainee | None = None
         self._replacements = 0
@@ -90,6 +98,7 @@ class ModelTrainer:
         self.renewals = 0
         self.verdict: Verdict | None = None
         self.wrong: tuple[Key, ...] = ()
+        self.error = 1.0
 
     @property
     def model(self) -> DreamModel:
@@ -107,8 +116,15 @@ class ModelTrainer:
         predicted = self.model.predict_one(real.transition.before)
         self.verdict = self._evaluated(self.model, predicted, real)
         self.acceptance.count(self.verdict)
-        residuals, wrong = compared(predicted, real.transition.after)
+        residuals, wrong = compared(predicted, real.transition.after, self._precision)
         self.wrong = wrong
+        layout = real.transition.before.layout
+        kinds = [layout.types[layout.index(name)].name for name, _ in residuals]
+        ratios = [
+            self.acceptance.ratio((kind, prop), off)
+            for kind, ((_, prop), off) in zip(kinds, residuals.items(), strict=True)
+        ]
+        self.error = max(ratios, default=1.0)
         self.prequential.count(residuals, wrong, Outcomes.of(predicted, real.transition.before, residuals))
         self.stock.add(real.start, first=real.first)
         replacement = self._challenge()

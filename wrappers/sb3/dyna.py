@@ -130,7 +130,8 @@ class Dyna(BaseCallback):  # type: ignore[misc]
         check_model(self.world, lens)
         reward_model = reward_model_of(lens, self._reward_model, self.world)
         if self._trainer is None:  # a second learn() goes on with what is known
-            self._trainer = ModelTrainer(self.world, reward_model, self.config)
+            precision = lens.recorder.view.precision
+            self._trainer = ModelTrainer(self.world, reward_model, self.config, precision)
         if self._mixed is not self.buffer:  # another agent's, or one that was loaded
             self.buffer.hold(self.config.capacity)
             self._mixed = self.buffer
