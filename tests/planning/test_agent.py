@@ -175,6 +175,24 @@ def test_orders_are_tried_until_two_come_to_the_same(
     assert called == lessons and next(told, None) is None
 
 
+def test_an_approximation_is_doubted_by_what_matters_and_learned_again_less_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counts: list[int] = []
+
+    def counted(model: Any, seen: Any, **options: Any) -> Any:
+        counts.append(len(seen))
+        return learned_again(model, seen, **options)
+
+    learned_again = planning_agent.learned_again
+    monkeypatch.setattr(planning_agent, "learned_again", counted)
+    made = PlanningAgent(gym.make("CartPole-v1"), search=SEARCH, random_steps=100, seed=0).learn(130)
+    assert np.mean(made._wrong) > 0.9  # to the last digit hardly anything was foreseen
+    assert made.doubt < 0.2
+    assert counts and set(counts) <= {75, 100}  # not after 111 and 123 steps, as where laws are exact
+    assert made._next_again == 200
+
+
 class Sledge(gym.Env[Any, Any]):
     """A position and a push that moves it; after so many steps of all episodes it moves it by a third as much."""
 

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from relgym import WorldModel
-from relgym.planning.review import learned_again, length, missed, mixed, right
+from relgym.planning.review import learned_again, length, missed, mixed, off_by, right
 from relgym.scene.objects import Transition
 from relgym.wrappers.dyna.recorder import TransitionRecorder
 
@@ -39,6 +39,25 @@ def test_each_transition_is_told_from_the_others() -> None:
     told = [seen[k] for k in good]
     moved = told[1].after.replace({("truck", "vx"): told[1].after["truck"]["vx"] + 0.5})
     assert right(model, [told[0], replace(told[1], after=moved), told[2]]).tolist() == [True, False, True]
+
+
+def test_a_step_is_off_by_the_largest_ratio_of_its_values() -> None:
+    env, seen = cart_steps(60)
+    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
+    good = np.flatnonzero(right(model, seen))[:2]
+    told = [seen[k] for k in good]
+    moved = told[1].after.replace({("truck", "vx"): told[1].after["truck"]["vx"] + 0.5})
+    asked: set[tuple[str, str]] = set()
+
+    def ratio(key: tuple[str, str], off: float) -> float:
+        asked.add(key)
+        return abs(off) / 2.0
+
+    off = off_by(model, [told[0], replace(told[1], after=moved)], ratio)
+    np.testing.assert_allclose(off, [0.0, 0.25], atol=1e-9)
+    assert asked == {(t.type, t.property) for t in model.targets}
+    nothing = WorldModel(env.schema, targets=())
+    assert off_by(nothing, told, ratio).tolist() == [1.0, 1.0]  # it knows of nothing that changes
 
 
 def test_nothing_is_right_of_nothing() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import relgym
+from relgym.errors import ConfigError
 from relgym.scene.objects import Transition
 from relgym.wrappers.dyna.config import DynaConfig
 from relgym.wrappers.dyna.recorder import Experience, TransitionRecorder
@@ -62,6 +63,26 @@ def test_a_model_that_leaves_out_what_moves_is_not_accepted() -> None:
     assert trainer.acceptance.known == 1.0  # nothing changes, it says
     assert trainer.acceptance.error > 0.5
     assert not trainer.acceptance.accepted
+
+
+def test_what_is_off_by_no_more_than_is_shown_is_not_wrong(rng: np.random.Generator) -> None:
+    lessons = steps(350, seed=1)
+    model = relgym.WorldModel(lessons[0].start.schema)
+    for k in rng.permutation(len(lessons)):
+        model.learn_one(lessons[k].transition)
+    model.frozen = True
+    known = [real for real in steps(60, seed=2) if model.predict_one(real.transition.before).ok][-20:]
+    for precision, wrong in ((0.0, True), (1e-6, False)):
+        trainer = ModelTrainer(model, make().get_wrapper_attr("task"), DynaConfig(), precision)
+        assert trainer.error == 1.0
+        for real in known:
+            after = real.transition.after
+            near = after.replace({("truck", "vx"): after["truck"]["vx"] + 1e-7})
+            trainer.take_up(replace(real, transition=replace(real.transition, after=near)))
+            assert bool(trainer.wrong) is wrong
+            assert trainer.error < 1e-5
+    with pytest.raises(ConfigError, match="precision=-1"):
+        ModelTrainer(model, make().get_wrapper_attr("task"), precision=-1.0)
 
 
 @pytest.mark.parametrize("frozen", [False, True])
