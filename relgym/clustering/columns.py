@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.features import NO_FEATURES, Feature, Library
-from relgym.scene.objects import STILL, TASK, ObjectType, SceneLayout, Target
+from relgym.scene.objects import ACTION, STILL, TASK, ObjectType, SceneLayout, Target
 
 __all__ = ["Column", "SlotSignature", "slot_order"]
 
@@ -84,6 +84,14 @@ class SlotSignature:
             primes = [prop for name, prop in pairs if name == t.name]
             found.extend(Column(slot, prop + PRIME, self._rank(slot, posed=False)) for prop in primes)
         return tuple(sorted(found, key=lambda c: (c.rank, c.slot)))
+
+    @cached_property
+    def actions(self) -> tuple[int, ...]:
+        """Columns of the action's properties."""
+        kinds = [self.types[c.slot].name for c in self.columns]
+        return tuple(
+            k for k, c in enumerate(self.columns) if kinds[k] == ACTION and not c.property.endswith(PRIME)
+        )
 
     @cached_property
     def _places(self) -> NDArray[np.intp]:

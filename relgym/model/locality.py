@@ -173,8 +173,9 @@ class Neighbourhoods:
         pose = np.concatenate([scene.vector, (0.0, 1.0)])[self._plan.poses]
         self._centre = pose[:, self._plan.used]
         half = 0.5 * pose[:, [6 + axis for axis in self._plan.used]]
-        turned = (pose[:, 3:6] != 0.0).any(axis=1)
-        half[turned] = np.sqrt(np.square(half[turned]).sum(axis=1, keepdims=True))
+        if pose[:, 3:6].any():
+            turned = (pose[:, 3:6] != 0.0).any(axis=1)
+            half[turned] = np.sqrt(np.square(half[turned]).sum(axis=1, keepdims=True))
         self._half = half
 
     def window(self, focus: int) -> _Window:
@@ -204,15 +205,25 @@ class Neighbourhoods:
         away = np.zeros(len(plan.bodies))  # from who has no body nothing is far away
         if there:
             gaps = np.abs(self._centre - self._centre[number]) - self._half - self._half[number]
-            away = np.square(np.maximum(gaps, 0.0)).sum(axis=1)
+            gaps = np.square(np.maximum(gaps, 0.0))
+            away = gaps[:, 0].copy()
+            for axis in range(1, gaps.shape[1]):  # column by column, which takes a fourth of the time
+                away += gaps[:, axis]
             away[number] = -1.0  # the object itself comes before all others of its type
         for name, (members, count) in plan.groups.items():
-            nearest = np.argsort(away[members], kind="stable")[:count]
-            chosen[name] = sorted(plan.bodies[members[nearest]].tolist())
+            chosen[name] = sorted(plan.bodies[members[_nearest(away[members], count)]].tolist())
         objects = [chosen[t.name].pop(0) for t in plan.small.types]
         columns = np.repeat(plan.offsets[objects], plan.widths) + plan.within
         small = Scene(self._scene.schema, plan.small, self._scene.vector[columns])
         return _Window(objects, objects.index(focus), small, columns)
+
+
+def _nearest(away: NDArray[np.float64], count: int) -> NDArray[np.intp]:
+    """Which are nearest, of those equally near the first; the same as the beginning of a stable sort, in less time."""
+    if count >= len(away):
+        return np.arange(len(away))
+    near = np.flatnonzero(away <= np.partition(away, count - 1)[count - 1])
+    return near[np.argsort(away[near], kind="stable")[:count]]
 
 
 def learn_locally(

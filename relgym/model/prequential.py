@@ -97,7 +97,7 @@ class Outcomes:
     @classmethod
     def of(cls, prediction: ScenePrediction, before: Scene, residuals: Mapping[Key, float]) -> Outcomes:
         """What became of a prediction; `residuals` are those of `compared`."""
-        places, angles, now = before.layout.places, before.layout.angles, before.vector.tolist()
+        places, angles, now = before.layout.places, before.layout.angles, before.vector.item
         rows = []
         for part in prediction.parts:
             key = part.object, part.property
@@ -106,7 +106,7 @@ class Outcomes:
                 continue
             column = places[key]
             # Observed minus predicted plus predicted minus before; a turn is measured the short way, as its residual.
-            moved = part.value - now[column]
+            moved = part.value - now(column)
             if angles and column in angles:
                 moved = math.remainder(moved, 2.0 * math.pi)
             rows.append((key, off, off + moved, part.outcome is _PREDICTED, part.spread))
@@ -237,7 +237,7 @@ def compared(
     """
     residuals: dict[Key, float] = {}
     wrong: list[Key] = []
-    places, angles, numbers = after.layout.places, after.layout.angles, after.vector.tolist()
+    places, angles, number = after.layout.places, after.layout.angles, after.vector.item
     for part in () if prediction is None else prediction.parts:
         key = (part.object, part.property)
         column = places.get(key)
@@ -245,7 +245,7 @@ def compared(
             if part.object not in after:
                 continue
             column = after.layout.column(after.layout.index(part.object), part.property)
-        came = numbers[column]
+        came = number(column)
         off = came - part.value
         if angles and column in angles:  # π and -π are the same place
             off = math.remainder(off, 2.0 * math.pi)

@@ -38,7 +38,7 @@ from relgym.model.querying import Said, derive, settled
 from relgym.model.regression import Regression
 from relgym.model.rolling import BatchRollout
 from relgym.model.scenes import scene_of, wrap
-from relgym.model.target.spread import Spreads, action_columns
+from relgym.model.target.spread import Spreads
 from relgym.model.target.spread_split import place_of
 from relgym.model.trusting import trusting
 from relgym.program.gpu import Card
@@ -621,7 +621,7 @@ def _spreads(
     spreads: Spreads, signature: SlotSignature, gather: list[int]
 ) -> dict[int, Callable[[list[float]], float]]:
     """The spread of each mode as a function of the present state vector."""
-    actions = [gather[k] for k in action_columns(signature).tolist()]
+    actions = [gather[k] for k in signature.actions]
     found: dict[int, Callable[[list[float]], float]] = {}
     for mode, spread in spreads.by_mode.items():
         place = None if spread.split is None else place_of(spread.split.name, signature)

@@ -619,7 +619,7 @@ class WorldModel:
 
     def _calm(self, vectors: NDArray[np.float64]) -> AbstractContextManager[None]:
         """Where numbers are so large that what is worked out from them may overflow, that needs no warning."""
-        largest = float(np.abs(vectors).max(initial=0.0))
+        largest = max(float(vectors.max(initial=0.0)), -float(vectors.min(initial=0.0)))
         return nullcontext() if largest < _OVERFLOWS else np.errstate(over="ignore", invalid="ignore")
 
     @refusing(ObservationError)

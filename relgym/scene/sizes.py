@@ -38,7 +38,7 @@ def check_sizes(scene: Scene) -> None:
     plan = _plan(scene)
     if not plan.bodies.names:
         return
-    sizes = scene.vector[plan.scaled].tobytes()
+    sizes = scene.vector.take(plan.scaled).tobytes()
     if sizes != plan.fine:
         padded = np.concatenate([scene.vector, plan.constants])
         check_extents(plan.bodies, plan.axes, padded[plan.columns][:, :, None], plan.spheres)

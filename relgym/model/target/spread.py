@@ -19,7 +19,6 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
 from relgym.model.target.spread_split import Split, find_split, place_of
-from relgym.scene.objects import ACTION
 
 __all__ = ["Spread", "Spreads", "measure"]
 
@@ -92,7 +91,7 @@ class Spreads:
             place = place_of(spread.split.name, signature)
             if place is not None:
                 return spread.split.of(x[place])
-        return self.of(mode, tuple(x[k] for k in action_columns(signature).tolist()))
+        return self.of(mode, tuple(x[k] for k in signature.actions))
 
     def to_json(self) -> list[Any]:
         """Plain data that `from_json` reads back."""
@@ -195,23 +194,11 @@ def _loud(
     return found
 
 
-def action_columns(signature: SlotSignature) -> NDArray[np.intp]:
-    """Columns of the action's properties."""
-    return np.array(
-        [
-            k
-            for k, c in enumerate(signature.columns)
-            if signature.types[c.slot].name == ACTION and not c.property.endswith("'")
-        ],
-        dtype=np.intp,
-    )
-
-
 def _actions(table: ExampleTable, rows: NDArray[np.int64]) -> NDArray[np.float64] | None:
     """Actions of some rows, shape ``(n, components)``; None if they haven't as many components everywhere."""
     ids = table.signature_ids[rows]
     # Where the action's columns lie depends on which objects are there.
-    places = {k: action_columns(table.signatures[k]) for k in np.unique(ids).tolist()}
+    places = {k: table.signatures[k].actions for k in np.unique(ids).tolist()}
     width = {len(columns) for columns in places.values()}
     if len(width) != 1:
         return None
