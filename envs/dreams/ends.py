@@ -35,6 +35,7 @@ class Cause(enum.Enum):
 CAUSES = tuple(Cause)
 """Order in which batches number causes; -1 stands for a step that can be followed."""
 
+_LEFT = np.int8(CAUSES.index(Cause.LEFT))
 _FOLLOWED = OUTCOMES.index(Outcome.PREDICTED)
 _OF_OUTCOME = np.array(
     [-1 if o is Outcome.PREDICTED else CAUSES.index(Cause[o.name]) for o in OUTCOMES], dtype=np.int8
@@ -66,7 +67,7 @@ def causes(
     order), a margin too small, a property out of its bounds.
     """
     n = len(inside)
-    found = np.where(inside, -1, CAUSES.index(Cause.LEFT)).astype(np.int8)
+    found = np.where(inside, np.int8(-1), _LEFT)
     margins, outcomes = prediction.margins, prediction.outcomes
     if overruled:
         heeded = np.array([part not in overruled for part in prediction.parts], dtype=bool)

@@ -275,6 +275,11 @@ class BatchStepEvaluator:
         return callable(self.reward) or callable(self.terminated)
 
     @property
+    def evaluates(self) -> bool:
+        """Whether steps may be worth anything, or end an episode."""
+        return not (self.reward is None and self.terminated is None and self.both is None)
+
+    @property
     def overruled(self) -> frozenset[tuple[str, str]]:
         """As of `StepEvaluator`."""
         return _overruled(self.reward, self.terminated)

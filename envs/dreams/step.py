@@ -147,6 +147,8 @@ class DreamStep:
         layout = self.setting.layout
         # Single dreams are frozen: a function that changes what it evaluates would change the dream.
         before, after = _read_only(before), _read_only(after)
+        if tells is None and not self.evaluator.evaluates:
+            return np.zeros(len(before)), np.zeros(len(before), dtype=np.bool_), None
         if tells is None and not self.evaluator.asks:
             rewards, ended = self.evaluator(before, actions, after)
             return np.where(good, rewards, 0.0), ended & good, None

@@ -203,7 +203,9 @@ def _speed(found: Found) -> Shown:
         ]
     return Shown(
         measures,
-        ["Processor time, medians of five rounds; 1,024 scenes at once, the engine's in a SyncVectorEnv."],
+        [
+            "Processor time, medians of whole episodes and a reset; 1,024 scenes, the engine's in a SyncVectorEnv."
+        ],
     )
 
 
