@@ -229,9 +229,8 @@ class BoxesShown:
             columns = {layout.column(*pair) for pair in pairs}
             low, high = self._boxes.limits(layout)
             turns = {layout.column(i, prop) for i, t in enumerate(layout.types) for prop in t.angles}
-            columns |= {
-                c for c in turns if not (low[c] <= -np.pi and high[c] >= np.pi)
-            }  # to which they are wrapped
+            # Angles are wrapped to -π to π: where all of that is allowed nothing can leave.
+            columns |= {c for c in turns if low[c] > -np.pi or high[c] < np.pi}
             self._changing[parts] = np.array(sorted(columns), dtype=np.intp)
         return self._boxes.inside_at(self.layout, vectors, self._changing[parts])
 

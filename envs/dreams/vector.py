@@ -289,8 +289,6 @@ class LearnedModelVectorEnv(VectorEnv[Any, Any, NDArray[Any]]):
         if seed is not None:
             checked_count("seed", seed, 0, 2**62)
         place, count = self._setting, len(rows)
-        if self._known is not None and not options:
-            return self._known(self.np_random, count)
         if "scene" in options or "scenes" in options or self._start is not None or place.world is None:
             check_options(options, ("reset_mask", "scene", "scenes"))
         if "scenes" in options:

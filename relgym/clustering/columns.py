@@ -88,9 +88,10 @@ class SlotSignature:
     @cached_property
     def actions(self) -> tuple[int, ...]:
         """Columns of the action's properties."""
-        kinds = [self.types[c.slot].name for c in self.columns]
         return tuple(
-            k for k, c in enumerate(self.columns) if kinds[k] == ACTION and not c.property.endswith(PRIME)
+            k
+            for k, c in enumerate(self.columns)
+            if self.types[c.slot].name == ACTION and not c.property.endswith(PRIME)
         )
 
     @cached_property

@@ -48,7 +48,7 @@ _KNOWN: Final = 0.99
 """Share of the fresh steps that have to be right."""
 
 _THROWN: Final = 0.12
-"""Most that a ball is thrown up by at the beginning of a fresh episode, in m a step: no random play comes to the
+"""Most that a ball is thrown up by at the beginning of a fresh episode, in units a step: no random play comes to the
 ceiling, but what touches it obeys a law, too."""
 
 _TOLERANCE: Final = 1e-6

@@ -32,32 +32,32 @@ def test_a_model_that_learned_again_is_right_of_what_it_saw_and_the_old_one_is_l
     assert right(fresh, seen).mean() > 0.9
 
 
-def test_each_transition_is_told_from_the_others() -> None:
+def one_wrong() -> tuple[WorldModel, list[Transition]]:
+    """A model, and three steps: it is right of all but the second, whose velocity is off by 0.5."""
     env, seen = cart_steps(60)
     model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
-    good = np.flatnonzero(right(model, seen))[:3]
-    told = [seen[k] for k in good]
-    moved = told[1].after.replace({("truck", "vx"): told[1].after["truck"]["vx"] + 0.5})
-    assert right(model, [told[0], replace(told[1], after=moved), told[2]]).tolist() == [True, False, True]
+    first, second, third = (seen[k] for k in np.flatnonzero(right(model, seen))[:3])
+    moved = second.after.replace({("truck", "vx"): second.after["truck"]["vx"] + 0.5})
+    return model, [first, replace(second, after=moved), third]
+
+
+def test_each_transition_is_told_from_the_others() -> None:
+    model, steps = one_wrong()
+    assert right(model, steps).tolist() == [True, False, True]
 
 
 def test_a_step_is_off_by_the_largest_ratio_of_its_values() -> None:
-    env, seen = cart_steps(60)
-    model = learned_again(WorldModel(env.schema), seen, rng=np.random.default_rng(0))
-    good = np.flatnonzero(right(model, seen))[:2]
-    told = [seen[k] for k in good]
-    moved = told[1].after.replace({("truck", "vx"): told[1].after["truck"]["vx"] + 0.5})
+    model, steps = one_wrong()
     asked: set[tuple[str, str]] = set()
 
     def ratio(key: tuple[str, str], off: float) -> float:
         asked.add(key)
         return abs(off) / 2.0
 
-    off = off_by(model, [told[0], replace(told[1], after=moved)], ratio)
-    np.testing.assert_allclose(off, [0.0, 0.25], atol=1e-9)
+    np.testing.assert_allclose(off_by(model, steps, ratio), [0.0, 0.25, 0.0], atol=1e-9)
     assert asked == {(t.type, t.property) for t in model.targets}
-    nothing = WorldModel(env.schema, targets=())
-    assert off_by(nothing, told, ratio).tolist() == [1.0, 1.0]  # it knows of nothing that changes
+    nothing = WorldModel(model.schema, targets=())
+    assert off_by(nothing, steps, ratio).tolist() == [1.0] * 3  # it knows of nothing that changes
 
 
 def test_nothing_is_right_of_nothing() -> None:

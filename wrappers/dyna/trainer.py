@@ -119,10 +119,9 @@ class ModelTrainer:
         residuals, wrong = compared(predicted, real.transition.after, self._precision)
         self.wrong = wrong
         layout = real.transition.before.layout
-        kinds = [layout.types[layout.index(name)].name for name, _ in residuals]
         ratios = [
-            self.acceptance.ratio((kind, prop), off)
-            for kind, ((_, prop), off) in zip(kinds, residuals.items(), strict=True)
+            self.acceptance.ratio((layout.types[layout.index(name)].name, prop), off)
+            for (name, prop), off in residuals.items()
         ]
         self.error = max(ratios, default=1.0)
         self.prequential.count(residuals, wrong, Outcomes.of(predicted, real.transition.before, residuals))

@@ -362,6 +362,9 @@ def test_first_scenes_can_be_drawn_from_arrays_and_scenes() -> None:
         assert set(envs.reset(seed=0)[0]["cart"][:, 0].tolist()) == {10.0, 20.0}
     with pytest.raises(ConfigError, match="some scenes with the same objects"):
         drawn_from([])
+    wild = np.concatenate([vectors_of(scenes), np.full((1, 4), np.nan)])  # whether or not it would be drawn
+    with pytest.raises(ObservationError, match="start: scene 2 can't begin here"):
+        carts(1, start=drawn_from(wild)).reset(seed=0)
 
 
 def test_scenes_to_draw_from_may_name_their_objects_in_any_order() -> None:
