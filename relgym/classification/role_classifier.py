@@ -2,26 +2,85 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.classification.examples import Bools, Example, Vocabulary
+from relgym.classification.examples import Bools, Example, Floats, Vocabulary
 from relgym.classification.exemplars import Exemplars
 from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Definition
-from relgym.logic.csp import World
+from relgym.logic.csp import World, matches
+from relgym.logic.facts import Facts
 from relgym.logic.foil import learn
+from relgym.logic.search import UNIT
+from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["RoleClassifier", "RoleKind"]
 
 _MOST_ANSWERS: Final = 4096
 _Rows: TypeAlias = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lesson:
+    """What one description is to be learned from.
+
+    Parameters
+    ----------
+    facts
+        All examples.
+    positives, negatives
+        (example, target, object) of those that play the role, and of others of their type: shape ``(n, 3)``.
+    weights, weights_against
+        How many seen examples each stands for, shape ``(n,)``.
+    """
+
+    facts: Facts
+    positives: _Rows
+    negatives: _Rows
+    weights: Floats
+    weights_against: Floats
+
+    def errors(self, definition: Definition) -> float:
+        """Weight of what a definition gets wrong."""
+        taken, meant = (
+            np.logical_or.reduce(
+                [
+                    np.zeros(len(tuples), dtype=np.bool_),
+                    *(matches(c, self.facts, tuples) for c in definition.clauses),
+                ]
+            )
+            for tuples in (self.negatives, self.positives)
+        )
+        return float(self.weights[~meant].sum() + self.weights_against[taken].sum())
+
+
+@resumable
+def _learned(lessons: Sequence[_Lesson], config: ClassificationConfig) -> Steps[list[Definition | None]]:
+    """A definition of each role; none where nobody else could play it."""
+    found: list[Definition | None] = []
+    for lesson in lessons:
+        if not len(lesson.negatives):
+            found.append(None)
+            continue
+        definition = yield from learn.steps(
+            lesson.facts,
+            lesson.positives,
+            lesson.negatives,
+            pos_weights=lesson.weights,
+            neg_weights=lesson.weights_against,
+            config=foil_config(config),
+        )
+        found.append(definition)
+    return found
 
 
 class RoleClassifier:
@@ -64,6 +123,9 @@ class RoleClassifier:
         self.errors = 0.0
         self.contradictions = 0.0
         self.stale = bool(self.kinds)
+        # What is being learned anew, if that was begun, and the weight of what it is taught by; files keep neither.
+        self._draft: Task[list[Definition | None]] | None = None
+        self._taught = 0.0
         self._answers: dict[tuple[Any, ...], tuple[Places | None, bool]] = {}
         self._extensions: dict[tuple[Any, ...], list[set[int]]] = {}
 
@@ -139,21 +201,24 @@ class RoleClassifier:
             if description.witness(_stances_of(view, where, view.target[where], who)):
                 self._answers.clear()
 
-    def refresh(self, exemplars: Exemplars, mode: int) -> int:
-        """Learn the descriptions anew from a mode's exemplars if they are stale; the work spent."""
+    def refresh(self, exemplars: Exemplars, mode: int, budget: float = math.inf) -> int:
+        """Learn stale descriptions anew from a mode's exemplars as far as a budget goes; the work spent.
+
+        They are learned in pieces (`Task`) of the exemplars that there are when that begins. Of those that come in the
+        meantime is counted what the new descriptions get wrong. Not `stale`: done.
+        """
         if not self.stale:
             return 0
         rows, roles = self._lessons(exemplars, mode)
         if not len(rows):
             return 0
-        view, weights = View.of_exemplars(exemplars), exemplars.weights()
-        work = sum(self._learn(description, view, rows, roles, weights) for description in self.descriptions)
-        self._answers.clear()
-        self._extensions.clear()
-        self.learned, self.seen = float(weights[rows].sum()), max(self.seen, float(weights[rows].sum()))
-        definitions = [d.definition for d in self.descriptions if d.definition is not None]
-        self.errors = sum((definition.errors for definition in definitions), 0.0)
-        self.contradictions, self.stale = 0.0, False
+        view, roles, weights = View.of_exemplars(exemplars).take(rows), roles[rows], exemplars.weights()[rows]
+        if self._draft is None:
+            self._begin(view, roles, weights)
+            assert self._draft is not None, "begun"
+        work = self._draft.advance(int(min(budget * UNIT, 2**62))) // UNIT + 1
+        if self._draft.done:
+            self._adopt(self._draft.result, view, roles, weights)
         return work
 
     # ----- state -----
@@ -199,34 +264,40 @@ class RoleClassifier:
         known = (exemplars.assigned == mode) & (roles >= 0).all(axis=1)
         return np.flatnonzero(known & (roles.shape[1] == len(self.kinds))), roles
 
-    def _learn(
-        self, description: RoleDescription, view: View, rows: _Rows, roles: _Rows, weights: Any
-    ) -> int:
-        """Learn one description: its objects against the others of their type (§3.5)."""
-        positives: list[tuple[int, int, int]] = []
-        negatives: list[tuple[int, int, int]] = []
-        type_row = view.unary[:, self.vocabulary.unary.index(description.kind.type)]
-        for row in rows.tolist():
-            target = int(view.target[row])
-            players = {int(roles[row, place]) for place in description.places}
-            for each in np.flatnonzero(type_row[row] & view.exists[row]).tolist():
-                if each != target:
-                    (positives if each in players else negatives).append((row, target, each))
-        for_, against = (np.array(some, dtype=np.int64).reshape(-1, 3) for some in (positives, negatives))
-        where, targets, who = for_.T
-        description.witness(_stances_of(view, where, targets, who))
-        if not negatives:
-            description.definition = None
-            return 0
-        description.definition = learn(
-            view.facts("all", self._scope),
-            for_,
-            against,
-            pos_weights=weights[for_[:, 0]],
-            neg_weights=weights[against[:, 0]],
-            config=foil_config(self.config),
+    def _lesson(self, description: RoleDescription, view: View, roles: _Rows, weights: Floats) -> _Lesson:
+        """What tells a role's objects from the others of their type (§3.5)."""
+        every = np.arange(len(view))
+        able = view.unary[:, self.vocabulary.unary.index(description.kind.type)] & view.exists
+        able[every, view.target] = False
+        plays = np.zeros_like(able)
+        plays[every[:, None], roles[:, list(description.places)]] = True
+        for_, against = (
+            np.column_stack([rows, view.target[rows], who])
+            for rows, who in (np.nonzero(able & plays), np.nonzero(able & ~plays))
         )
-        return description.definition.work
+        return _Lesson(
+            view.facts("all", self._scope), for_, against, weights[for_[:, 0]], weights[against[:, 0]]
+        )
+
+    def _begin(self, view: View, roles: _Rows, weights: Floats) -> None:
+        """Begin to learn all descriptions anew."""
+        lessons = [self._lesson(description, view, roles, weights) for description in self.descriptions]
+        for description, lesson in zip(self.descriptions, lessons, strict=True):
+            where, targets, who = lesson.positives.T
+            description.witness(_stances_of(view, where, targets, who))
+        self._draft, self._taught = Task(_learned, lessons, self.config), float(weights.sum())
+
+    def _adopt(self, found: Sequence[Definition | None], view: View, roles: _Rows, weights: Floats) -> None:
+        """Take over descriptions that were learned, and count what they get wrong of the exemplars there are now."""
+        self.errors = 0.0
+        for description, definition in zip(self.descriptions, found, strict=True):
+            description.definition = definition
+            if definition is not None:
+                self.errors += self._lesson(description, view, roles, weights).errors(definition)
+        self.learned, self.seen = self._taught, max(self.seen, float(weights.sum()))
+        self.contradictions, self.stale, self._draft = 0.0, False, None
+        self._answers.clear()
+        self._extensions.clear()
 
     def _search(self, example: Example, order: Places) -> tuple[Places | None, bool]:
         """Joint search over all kinds for the assignment with the highest score; whether no other is as good."""

@@ -81,12 +81,12 @@ class Casting:
         return known.observe(example, roles, weight)
 
     def refresh(self, exemplars: Exemplars, budget: float) -> int:
-        """Learn stale descriptions anew until the budget is spent; the work spent."""
+        """Learn stale descriptions anew as far as the budget goes; the work spent."""
         spent = 0
         for number in sorted(self.classifiers):
             if spent >= budget:
                 break
-            spent += self.classifiers[number].refresh(exemplars, number)
+            spent += self.classifiers[number].refresh(exemplars, number, budget - spent)
         return spent
 
     def assign(
