@@ -35,6 +35,7 @@ from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -117,7 +118,7 @@ class Key(NamedTuple):
     lead: int
 
 
-class Audit(NamedTuple):
+class Audit(msgspec.Struct, frozen=True, gc=False):
     """What looking back at a prediction needs: its cell, what each of `EXPERTS` said (NaN: nothing), and who spoke."""
 
     key: Key

@@ -9,7 +9,7 @@ small scenes have the same layout, whoever the neighbours are.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -262,7 +262,7 @@ def _told_of(told: ScenePrediction, window: _Window, layout: SceneLayout) -> Sce
             if not all(role in names for role in one.roles):
                 return None
             roles = tuple(names[role] for role in one.roles)
-            found.append(replace(one, object=names[own], roles=roles))
+            found.append(one.replace(object=names[own], roles=roles))
     return ScenePrediction(window.scene, tuple(found))
 
 
@@ -300,7 +300,7 @@ def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene, ask: Ask) 
         for one in (said or predict(parts, near.percept(focus), window.scene)).parts:
             if names[one.object] == layout.names[focus]:
                 roles = tuple(names[role] for role in one.roles)
-                found.append(replace(one, object=layout.names[focus], roles=roles))
+                found.append(one.replace(object=layout.names[focus], roles=roles))
                 following[layout.column(focus, one.property)] = one.value
     derive(parts.schema, layout, scene.vector[None], following[None])
     wrap(layout, following)
@@ -373,5 +373,5 @@ def _told(batch: BatchPrediction) -> tuple[Prediction, ...]:
         outcome, mode = OUTCOMES[int(batch.outcomes[0, k])], int(batch.modes[0, k])
         one = Prediction(name, prop, value, outcome, mode, (), float(batch.margins[0, k]), batch.frames[k])
         stated = float(batch.probabilities[0, k]), float(batch.intervals[0, k])
-        found.append(replace(one, probability=stated[0], interval=stated[1]))
+        found.append(one.replace(probability=stated[0], interval=stated[1]))
     return tuple(found)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -81,7 +80,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
             if not np.isfinite(one.value):
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
-                one = replace(one, outcome=outcome, mode=0, spread=np.nan)
+                one = one.replace(outcome=outcome, mode=0, spread=np.nan)
             one = settled(parts, parts.models[target], percept, index, following, one, lawful=lawful)
             following[column] = one.value
             if not one.ok:

@@ -59,7 +59,7 @@ class Limits:
         if self.least <= found.value <= self.most:
             return found
         value, mode = (self.least, self.low) if found.value < self.least else (self.most, self.high)
-        return replace(found, value=value, mode=mode, roles=found.roles[:1])
+        return found.replace(value=value, mode=mode, roles=found.roles[:1])
 
     def cut_off_all(self, values: NDArray[np.float64], modes: NDArray[np.int64]) -> None:
         """Likewise for many values and the modes that gave them, in place; NaN stays."""

@@ -582,7 +582,7 @@ class PropertyModel:
         row = percept.rows(index, following[None], ordered=casts)
         x = row[0].tolist()
         if not self.fallback.scope.covers_one(x, situation.signature):
-            return replace(nothing, outcome=Outcome.UNEXPLAINED)
+            return nothing.replace(outcome=Outcome.UNEXPLAINED)
         example = self._shown(situation, row)
         ranking = self.classifier.rank(
             example, self.functions.values_one(situation.signature, x, self.classifier.modes)
@@ -601,7 +601,7 @@ class PropertyModel:
                 if not self.config.abstain:
                     continue
                 # What lost the vote doesn't become likely because the winner's players are in doubt.
-                return replace(nothing, outcome=Outcome.OUTSIDE)
+                return nothing.replace(outcome=Outcome.OUTSIDE)
             rest = iter(slots)
             played = (0, *(s if s >= 0 else next(rest) for s in binding.forced))
             roles = tuple(layout.names[order[s]] for s in played)
@@ -610,8 +610,8 @@ class PropertyModel:
             value = self.fallback.within(binding.value(x, slots), situation.signature, row)
             found = Prediction("", "", value, outcome, mode, roles, margin)
             found = self._stopped(self.limits.cut_off(found), situation.signature, row)
-            return replace(found, spread=self.spreads.at(found.mode, situation.signature, x))
-        return replace(nothing, outcome=Outcome.NO_ROLES)
+            return found.replace(spread=self.spreads.at(found.mode, situation.signature, x))
+        return nothing.replace(outcome=Outcome.NO_ROLES)
 
     def predict_batch(self, percept: Percept, index: int, following: NDArray[np.float64]) -> Verdict:
         """Predict for one object of n scenes; bit for bit what `predict_one` gives.
@@ -702,7 +702,7 @@ class PropertyModel:
         self.stops.apply(signature, row, values, modes)
         if modes[0] == found.mode and (values[0] == found.value or np.isnan(values[0])):
             return found
-        return replace(found, value=float(values[0]), mode=int(modes[0]), roles=found.roles[:1])
+        return found.replace(value=float(values[0]), mode=int(modes[0]), roles=found.roles[:1])
 
     def _apply(
         self,
