@@ -23,9 +23,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
-from relgym.config.constants import PIVOT
-from relgym.numeric.ransac import Consensus, consensus, refine
+from relgym.config.constants import EXTRAPOLATED, PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
+from relgym.numeric.ransac import CLOSE, Consensus, consensus, refine
 from relgym.numeric.stepwise import (
     LinearFit,
     fitting_cells,
@@ -108,11 +109,17 @@ class Scale:
         return self.tail_stds * self.sigma
 
 
-def least_examples(y: NDArray[np.float64], scale: Scale, config: ClusteringConfig) -> int:
-    """T: examples that found a mode, from the number of bits by which each verifies the function."""
+def least_examples(
+    y: NDArray[np.float64], scale: Scale, config: ClusteringConfig, *, choices: int = 1
+) -> int:
+    """T: examples that found a mode, from the number of bits by which each verifies the function.
+
+    Where each may be read in so many ways, that takes as many bits as it takes to name one.
+    """
     if config.min_examples != "auto":
         return int(config.min_examples)
-    share = min(max((EXACT - verifying_bits(y, scale)) / 12.0, 0.0), 1.0)
+    bits = verifying_bits(y, scale) - math.log2(choices)
+    share = min(max((EXACT - bits) / 12.0, 0.0), 1.0)
     return round(10 + 30 * share)
 
 
@@ -149,6 +156,7 @@ def find_mode(
     counting: bool = False,
     rows: NDArray[np.intp] | None = None,
     apart: NDArray[np.integer] | None = None,
+    orders: NDArray[np.intp] | None = None,
 ) -> Steps[Consensus | None]:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -169,6 +177,9 @@ def find_mode(
         Those that are searched; default: `searched`.
     apart
         In how many facts the relational states of these rows differ, shape ``(rows, rows)``, for states with few rows.
+    orders
+        Orders in which objects may stand (`relgym.clustering.exchange`); where there are any, functions in which these
+        have a say are looked for in all of them, too. What such a one explains, it explains in the order that suits.
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = searched(len(y), fresh, rng) if rows is None else rows
@@ -191,25 +202,94 @@ def find_mode(
             strata=strata[rows],
             apart=apart,
             anchors=np.flatnonzero(rows >= len(y) - fresh),
-            limit=48 if columns <= WIDE else 6,
+            limit=SAMPLES_TRIED if columns <= WIDE else SAMPLES_ALIKE,
             misfit=scale.misfit,
         )
-        if found is None or found.size < min(needed, 6):
-            continue
-        found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
-        if found is None or found.size < needed:
-            continue
-        yield law_cells(found, stages[0])
-        if is_law(x, y, found, stages[0], scale):
-            return found
-        if number >= len(simple) and columns > completed:
-            completed = columns
-            fit = yield from _complete(
-                x[rows][:, :columns], y[rows], found.fit, scale=scale, terms=config.max_terms
+        if found is not None and found.size >= min(needed, 6):
+            found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
+            if found is not None and found.size >= needed:
+                lacking = number >= len(simple) and columns > completed
+                completed = columns if lacking else completed
+                part = rows if lacking else None
+                told = yield from _law_of(x, y, found, part, columns, stages[0], needed, scale, config)
+                if told is not None:
+                    return told
+        if orders is not None and stages[0] < columns <= WIDE:
+            fresher = int((rows >= len(y) - fresh).sum())
+            found = yield from _in_any_order(
+                x[rows][:, :columns],
+                y[rows],
+                orders[:, :columns],
+                own=stages[0],
+                fresh=fresher,
+                terms=terms,
+                needed=needed,
+                scale=scale,
+                config=config,
+                rng=rng,
             )
-            found = yield from identified.steps(x, y, fit, scale=scale, support=config.support)
-            if found is not None and found.size >= needed and is_law(x, y, found, stages[0], scale):
-                return found
+            if found is not None:
+                inliers = np.zeros(len(y), dtype=np.bool_)
+                inliers[rows] = found.inliers
+                return Consensus(found.fit, inliers)
+    return None
+
+
+def _law_of(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    found: Consensus,
+    rows: NDArray[np.intp] | None,
+    columns: int,
+    own: int,
+    needed: int,
+    scale: Scale,
+    config: ClusteringConfig,
+) -> Steps[Consensus | None]:
+    """A function that is a law of enough rows, or becomes one with terms that it lacks, sought in `rows`."""
+    yield law_cells(found, own)
+    if is_law(x, y, found, own, scale):
+        return found
+    if rows is None:
+        return None
+    fit = yield from _complete(x[rows][:, :columns], y[rows], found.fit, scale=scale, terms=config.max_terms)
+    more = yield from identified.steps(x, y, fit, scale=scale, support=config.support)
+    return more if more is not None and more.size >= needed and is_law(x, y, more, own, scale) else None
+
+
+def _in_any_order(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    orders: NDArray[np.intp],
+    *,
+    own: int,
+    fresh: int,
+    terms: int,
+    needed: int,
+    scale: Scale,
+    config: ClusteringConfig,
+    rng: np.random.Generator,
+) -> Steps[Consensus | None]:
+    """A function that enough rows obey, each in the order of its objects that suits (`relgym.clustering.exchange`)."""
+    loose = (
+        EXTRAPOLATED if scale.misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / scale.sigma))
+    )
+    for reading in readings(x, orders):
+        least = max(needed, least_examples(y, scale, config, choices=len(reading.orders)))
+        fits = yield from reading.candidates(
+            y, sigma=scale.sigma, loose=loose, terms=terms, draws=config.draws // 3, fresh=fresh, rng=rng
+        )
+        for fit in fits:
+            read = reading.best(fit, y, scale.sigma)
+            near = np.abs(y - fit.predict(read)) <= loose * scale.tolerance
+            yield CALL + 2 * reading.x.size * len(reading.orders)
+            if near.sum() < least:
+                continue
+            fit = least_squares(read[near], y[near], fit.columns, intercept=False)
+            read = reading.best(fit, y, scale.sigma)  # what is fitted to more rows may suit in another order
+            found = yield from identified.steps(read, y, fit, scale=scale, support=config.support)
+            if found is not None and found.size >= least and is_law(read, y, found, own, scale):
+                return Consensus(reading.written_out(found.fit), found.inliers)
     return None
 
 
@@ -404,6 +484,17 @@ def _lively(column: NDArray[np.float64]) -> bool:
     return bool((np.diff(column) != 0.0).mean() >= CHANGES)
 
 
+def verifying_combinations(weights: int, combinations: int, columns: int, told: float) -> int:
+    """Combinations of values that must verify weights on them, beside those that fix these.
+
+    By chance one agrees with probability 1 / `told`, what tells responses apart. The columns, and the combinations that
+    fix their weights, are chosen in at most ``C(columns, weights) * combinations**weights`` ways. So many must agree
+    that less than one of these is expected to get there by chance: one where data are exact, more through noise.
+    """
+    ways = math.log2(math.comb(columns, weights)) + weights * math.log2(combinations)
+    return max(1, math.ceil(ways / math.log2(max(told, 2.0))))
+
+
 def _enough_combinations(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
 ) -> bool:
@@ -420,9 +511,10 @@ def _enough_combinations(
     combinations = len(np.unique(x[:, slow], axis=0))
     weight = dict(zip(fit.columns, fit.weights, strict=True))
     part = sum(weight[c] * x[:, c] for c in slow)
-    # If every combination contributes another value, each one beyond the parameters verifies them exactly.
-    verified = len(np.unique(np.round(part / (100.0 * tolerance)))) >= len(slow) + 3
-    if combinations < 2 * len(slow) + 2 and not verified:
+    # If every combination contributes another value, each verifies them that weights and a constant don't use up.
+    verified = len(np.unique(np.round(part / (100.0 * tolerance))))
+    spare = verifying_combinations(len(slow), combinations, x.shape[1], float(np.ptp(y)) / tolerance)
+    if combinations < 2 * len(slow) + 2 and verified < len(slow) + 1 + spare:
         return False
     if len(slow) == len(fit.columns) and np.ptp(y) > tolerance:
         return len(np.unique(np.round(y / tolerance))) >= 2 * fit.terms

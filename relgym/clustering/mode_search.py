@@ -18,6 +18,7 @@ from relgym.clustering.discovery import (
 )
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.exchange import orders_of
 from relgym.clustering.extension import extended, is_flag
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE
@@ -201,6 +202,7 @@ class ModeSearch:
             counting=counts(population.y, population.scale),
             rows=part,
             apart=table.differences(rows[part]) if several else None,
+            orders=orders_of(slots, order, population.config.draws),
         )
         budget.spend(CALL + len(rows) * len(order) + several * len(part) ** 2)
 

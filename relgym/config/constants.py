@@ -23,6 +23,9 @@ __all__ = [
     "POWERS",
     "ROUGH",
     "ROUNDINGS",
+    "SAMPLES_ALIKE",
+    "SAMPLES_TRIED",
+    "SCENE_ROWS",
     "SEARCHED_CELLS",
     "STDS",
     "SUMMABLE",
@@ -66,6 +69,17 @@ exceptions are a twentieth of those that numbers without a law would take."""
 
 SEARCHED_CELLS: Final = 1_000_000
 """Numbers that one search looks at, at most: about 4 ms for each of the passes that it makes over them."""
+
+SAMPLES_ALIKE: Final = 6
+"""Random samples that chose the same columns and are tried on all rows, at most: where one in three is of one mode,
+none of six is in a tenth of all searches, and the next search draws others."""
+
+SAMPLES_TRIED: Final = 48
+"""Random samples that are tried on all rows in one search, at most: those of eight sets of columns."""
+
+SCENE_ROWS: Final = 3
+"""Rows of each scene in a random sample of a few scenes: one tells what is constant in it, the others what changes. Of
+two scenes, the fewest, half of the six rows verify a function of a present value, an action and what is constant."""
 
 CONTACTS_KEPT: Final = 3_000
 """Contacts that laws of touching pairs remember, at most: some hundred of each kind in a world of many kinds."""

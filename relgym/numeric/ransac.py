@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EXTRAPOLATED, STDS
+from relgym.config.constants import EXTRAPOLATED, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
 from relgym.numeric.stepwise import (
     COARSE,
     MANY,
@@ -32,7 +32,7 @@ from relgym.numeric.stepwise import (
 )
 from relgym.scheduling.work import CALL, Steps, resumable
 
-__all__ = ["Consensus", "consensus", "draw_samples", "refine"]
+__all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "refine"]
 
 CLOSE = 0.01
 """Samples are extrapolated with a wider tolerance (`EXTRAPOLATED`), but not so wide, where there is noise, that it
@@ -115,7 +115,7 @@ def consensus(
     strata: NDArray[np.integer] | None = None,
     apart: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
-    limit: int = 48,
+    limit: int = SAMPLES_TRIED,
     misfit: bool = False,
 ) -> Steps[Consensus | None]:
     """The function with the largest consensus among random samples; None if no sample verified itself.
@@ -203,7 +203,7 @@ def _forward_batch(
     """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
     draws, size = samples.shape
     enough = size * (loose * sigma) ** 2
-    choose = _choose_among_many if x.shape[1] > MANY else _choose
+    choose = _choose_among_many if x.shape[1] > MANY else choose_columns
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
     for part in _pieces(draws, CHUNK, size * x.shape[1]):
         a, b = x[samples[part].T], y[samples[part]]
@@ -215,7 +215,7 @@ def _forward_batch(
     return every
 
 
-def _choose(
+def choose_columns(
     a: NDArray[np.float64], residual: NDArray[np.float64], terms: int, sigma: float, enough: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Columns for each sample, ``(draws, terms)``, and what they leave; what is chosen is swept out of all others.
@@ -306,7 +306,7 @@ def _distinct(
         picked = sorted(c for c in columns if c >= 0)
         key = tuple(picked)
         seen[key] = seen.get(key, 0) + 1
-        if seen[key] <= 6:
+        if seen[key] <= SAMPLES_ALIKE:
             kept.append((samples[i], picked))
         if len(kept) >= limit:
             break

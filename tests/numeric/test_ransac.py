@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from relgym.numeric import ransac
 from relgym.numeric.ransac import (
     Consensus,
-    _choose,
     _choose_among_many,
     _distinct,
+    choose_columns,
     consensus,
     draw_samples,
     refine,
@@ -224,7 +224,9 @@ def test_among_many_columns_samples_choose_what_they_choose_among_few(terms: int
     weights = rng.uniform(0.5, 2.0, size=(20, terms)) * rng.choice([-1.0, 1.0], size=(20, terms))
     y = (np.take_along_axis(a, picked[:, None, :], axis=2) * weights[:, None]).sum(axis=2)
     rows = a.swapaxes(0, 1)
-    told = [choose(rows.copy(), y.copy(), terms, 1e-9, 1e-16) for choose in (_choose, _choose_among_many)]
+    told = [
+        choose(rows.copy(), y.copy(), terms, 1e-9, 1e-16) for choose in (choose_columns, _choose_among_many)
+    ]
     np.testing.assert_array_equal(told[0][0], told[1][0])
     np.testing.assert_allclose(told[0][1], told[1][1], rtol=1e-6, atol=1e-20)
     for (columns, left), sample in ((each, k) for each in told for k in range(20)):
@@ -240,7 +242,7 @@ def test_a_verified_sample_stops_choosing() -> None:
     a -= a.mean(axis=1, keepdims=True)
     y = np.array([[1.0, 5.0, -2.0, 0.5], [2.0, -2.0, 2.0, -2.0], [0.0, 0.0, 0.0, 0.0]])
     y -= y.mean(axis=1, keepdims=True)
-    chosen, left = _choose(a.swapaxes(0, 1).copy(), y, 1, 1e-9, 1e-12)
+    chosen, left = choose_columns(a.swapaxes(0, 1).copy(), y, 1, 1e-9, 1e-12)
     assert chosen[1:].tolist() == [[1], [-1]]
     assert chosen[0, 0] >= 0 and left[0] > 1.0
     assert left[1:] == pytest.approx([0.0, 0.0], abs=1e-12)
