@@ -82,6 +82,13 @@ class ModeClassifier:
         return any([pair.stale for pair in self._pairs.values()])
 
     @property
+    def flawless(self) -> set[int]:
+        """Modes that are told from all others without an error among the examples that are remembered."""
+        return set(self.modes) - {
+            mode for pair in self._pairs.values() if pair.errors > 0 or pair.stale for mode in pair.modes
+        }
+
+    @property
     def relations(self) -> frozenset[str]:
         """Names of the binary relations that clauses ask for: `rank_batch` needs no others."""
         used = self._familiarity().used
@@ -235,23 +242,29 @@ class ModeClassifier:
         self._update_pairs(())
         self._reset_caches()
 
-    def refresh(self, budget: float = math.inf) -> int:
+    def refresh(self, budget: float = math.inf, amended: set[int] | None = None) -> int:
         """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
 
         Work is counted in units of twelve cells, never in time: the result is the same
         on any machine. A pair is learned in pieces (`Task`), and a piece is finished once begun: one call can
         overdraw the budget, and a pair may be finished by a later call.
+
+        To `amended` are added modes of which it was learned again when they hold.
         """
-        spent, changed = 0, False
+        spent, changed = 0, set[int]()
         if not self.waits:
             return 0
         for pair in sorted((p for p in self._pairs.values() if p.stale), key=lambda p: p.urgency):
+            before = pair.classifier
             while pair.stale and spent < budget:
                 lesson = self._lessons([pair.modes])[pair.modes]
                 spent += pair.refresh(lesson, self.config, budget - spent)
-                changed |= not pair.stale
+            if pair.classifier is not before:
+                changed |= set(pair.modes)
         if changed:
             self._pairs_changed()
+        if amended is not None:
+            amended |= changed
         return spent
 
     # ----- state -----

@@ -38,7 +38,7 @@ class _Lesson:
     facts
         All examples.
     positives, negatives
-        (example, target, object) of those that play the role, and of others of their type: shape ``(n, 3)``.
+        (example, target, object) of those bound to the role, and of others of their type: shape ``(n, 3)``.
     weights, weights_against
         How many seen examples each stands for, shape ``(n,)``.
     """
@@ -65,7 +65,7 @@ class _Lesson:
 
 @resumable
 def _learned(lessons: Sequence[_Lesson], config: ClassificationConfig) -> Steps[list[Definition | None]]:
-    """A definition of each role; none where nobody else could play it."""
+    """A definition of each role; none where nobody else could be bound to it."""
     found: list[Definition | None] = []
     for lesson in lessons:
         if not len(lesson.negatives):

@@ -19,6 +19,11 @@ believed twice and failed, until it was right twice as long: an epidemic ends, a
 known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
 Where it had none yet, all cells together tell whether it speaks.
 
+Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
+the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
+it is learned again when a mode holds, and then without an error in a world that laws explain, what it got wrong before
+was another rule's fault: its record begins anew (`Calibration.revise`), with less credit each time.
+
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
 `ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
@@ -213,6 +218,7 @@ class _Record:
     # Over: trials in those of misses, of hits; how many. Then the mean length of those of hits in the two records
     # before this one that misses ended; 0: there was none.
     runs: list[float] = field(default_factory=lambda: [0.0] * 6)
+    revised: int = 0  # how often what tells when a mode holds was learned again after it had been wrong
     _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
     def add(self, hit: bool, times: int, *, fitted: bool) -> None:
@@ -284,9 +290,11 @@ class _Record:
         """How probably the next one is a hit.
 
         One part of the prior has it that hits come in some share (`mean`). The other one, larger by so many bits, that
-        what speaks is a law and always right: that holds until the first miss.
+        what speaks is a law and always right: that holds until the first miss. Who was revised r times, and failed each
+        time, will be right with the odds of 1 to 2 r + 1 (Jeffreys' prior).
         """
         some = self.mean(prior)
+        bits -= math.log2(2 * self.revised + 1)
         if self.hits < self.trials or not (self.trials or bits):
             return some
         n = (
@@ -710,6 +718,7 @@ class Calibration:
         turn: float = 0.0,
         times: int = 0,
         stands: int = 0,
+        misled: bool = False,
     ) -> None:
         """Take in how a prediction came out.
 
@@ -731,6 +740,8 @@ class Calibration:
             For how many predictions it stands that were confirmed (`confirm`); 0: it wasn't.
         stands
             For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
+        misled
+            Whether what it read was predicted wrongly: that says nothing of what it makes of it.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
@@ -749,6 +760,15 @@ class Calibration:
             for cell in self._cells.values():
                 cell.heard *= 0.5
         known = len(self._cells)
+        if not misled:
+            self._tally(audit, errors, within, rounding, times, stands)
+        self._changed(cells=len(self._cells) > known)
+
+    def _tally(
+        self, audit: Audit, errors: Sequence[float], within: float, rounding: float, times: int, stands: int
+    ) -> None:
+        """Count how a prediction came out in its cells; arguments as of `look_back`."""
+        many = max(times, 1)
         for key in _levels(audit.key) if audit.key.winner else (audit.key,):
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
@@ -761,7 +781,6 @@ class Calibration:
         if not (times or stands) and errors[audit.speaker] > rounding:
             for key in _levels(audit.key)[1:]:
                 self._cells[key].steady = 0
-        self._changed(cells=len(self._cells) > known)
 
     def confirm(self, key: Key, share: float, draw: float) -> int:
         """Take note that a prediction came true; how many such ones it stands for, 0 if another one will for it.
@@ -838,6 +857,16 @@ class Calibration:
         cell.squares[PERSISTENCE][0] += times
         cell.heard += times
         self.trials += count
+        self._changed()
+
+    def revise(self, modes: Collection[int]) -> None:
+        """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more."""
+        for key, cell in self._cells.items():
+            own = cell.records.get(OWN)
+            if key.winner in modes and key.lead != OF_FAMILY and own is not None and own.hits < own.trials:
+                cell.records[OWN] = _Record(revised=own.revised + 1)
+                cell.squares[OWN] = [0.0, 0.0, 0.0]
+                cell._sure = None
         self._changed()
 
     def keep(self, modes: Collection[int]) -> None:
@@ -940,7 +969,7 @@ class Calibration:
                             r.hits,
                             r.run,
                             [[k, n] for k, n in sorted(r.errors.items())],
-                            r.runs[: 6 if r.runs[5] else 4],
+                            [*r.runs, float(r.revised)] if r.revised else r.runs[: 6 if r.runs[5] else 4],
                         ]
                         for who, r in sorted(cell.records.items())
                     ],
@@ -968,6 +997,7 @@ class Calibration:
                     int(run),
                     {int(k): float(c) for k, c in bins},
                     [*map(float, runs), 0.0, 0.0][:6],
+                    int(next(iter(runs[6:]), 0)),
                 )
                 for who, n, hits, run, bins, runs in each["records"]
             }

@@ -75,6 +75,7 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
         clusterer.approximate,
         model.surmise,
         model.rough,
+        known.guessable,
     )
     if not votes:
         return

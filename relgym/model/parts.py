@@ -343,6 +343,18 @@ class Parts:
                 return self.models[target]
         raise QueryError(f"{type_name}.{prop} is no target; the model has {[str(t) for t in self.targets]}")
 
+    def relied_on(self, model: PropertyModel) -> frozenset[tuple[str, str]]:
+        """(type, property) pairs whose next values a target's modes read, as far as laws tell these exactly.
+
+        What is only approximated is never quite right: how right a target is that reads it, its own record tells.
+        """
+        if not model.target.given:
+            return frozenset()
+        known = {pair: self.property_model(*pair) for pair in model.needs}
+        return frozenset(
+            pair for pair, read in known.items() if self.governs(read.target) or not read.fallback.guessable
+        )
+
     def regressed(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
         """Changes of a property that regressions predict for an object of n scenes, shape ``(n, kinds)``."""
         regression = self.regressions[percept.layout.types[index].name]

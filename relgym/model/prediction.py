@@ -136,7 +136,10 @@ class Prediction(msgspec.Struct, frozen=True, gc=False, eq=False):
         return f"Prediction({', '.join(f'{name}={said!r}' for name, said in self._said().items())})"
 
     def __eq__(self, other: Any) -> bool:
-        return self._said() == other._said() if isinstance(other, Prediction) else NotImplemented
+        if not isinstance(other, Prediction):
+            return NotImplemented
+        pairs = zip(self._said().values(), other._said().values(), strict=True)
+        return all(a == b or (a != a and b != b) for a, b in pairs)  # what neither knows is the same
 
     __hash__ = None  # type: ignore[assignment]
 

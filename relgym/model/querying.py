@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -40,12 +40,37 @@ from relgym.model.target.property_model import PropertyModel, Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Said", "derive", "predict", "predict_many", "settled"]
+__all__ = ["Odds", "Said", "derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.OUTSIDE, Outcome.DEPENDS, Outcome.UNEXPLAINED, Outcome.UNSURE)
 )
+
+
+class Odds:
+    """How probably the predictions of a scene are right, as they are made, by (type, property).
+
+    Whose record is of steps in which what it reads was right is right as probably as both are.
+    """
+
+    __slots__ = ("_least",)
+
+    def __init__(self) -> None:
+        self._least: dict[tuple[str, str], float] = {}
+
+    def add(self, pair: tuple[str, str], probability: float) -> None:
+        """Take note of one; of several objects the least probable counts, and NaN for certain."""
+        if probability < self._least.get(pair, 1.0):
+            self._least[pair] = probability
+
+    def together(self, pairs: Collection[tuple[str, str]]) -> float:
+        """How probably all of some are right, multiplied in the order of predictions."""
+        found = 1.0
+        for pair, probability in self._least.items() if pairs else ():
+            if pair in pairs:
+                found *= probability
+        return found
 
 
 class Said(NamedTuple):
@@ -65,6 +90,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
     layout, following = scene.layout, scene.vector.copy()
     found: list[Prediction] = []
     lost: set[tuple[str, str]] = set()
+    odds = Odds()
     motion = None if parts.laws is None else parts.laws.speak(percept)
     for target in parts.targets:
         for index in layout.of_type(target.type):
@@ -81,7 +107,7 @@ def predict(parts: Parts, percept: Percept, scene: Scene) -> ScenePrediction:
                 # A mode whose value overflows has left its experience; other outcomes say why they are empty.
                 outcome = Outcome.OUTSIDE if one.ok else one.outcome
                 one = one.replace(outcome=outcome, mode=0, spread=np.nan)
-            one = settled(parts, parts.models[target], percept, index, following, one, lawful=lawful)
+            one = settled(parts, parts.models[target], percept, index, following, one, odds, lawful=lawful)
             following[column] = one.value
             if not one.ok:
                 lost.add((target.type, target.property))
@@ -98,8 +124,10 @@ def settled(
     index: int,
     following: NDArray[np.float64],
     one: Prediction | Said,
+    odds: Odds,
     values: tuple[float, ...] | None = None,
     far: int | None = None,
+    relied_on: Collection[tuple[str, str]] | None = None,
     *,
     lawful: bool,
 ) -> Prediction:
@@ -113,10 +141,14 @@ def settled(
         Next values as far as they are predicted, the present one of this property, shape ``(width,)``.
     one
         What modes or laws say; its value is NaN where they say nothing.
+    odds
+        How probably predictions so far are right, of each (type, property) the least; this one's is added.
     values
         What all experts say, if that is known already.
     far
         The bin of how far the scene lies from what was learned (`far_bin`), where that counts, if it is known already.
+    relied_on
+        See `Parts.relied_on`, if it is known already.
     lawful
         Whether laws say it (`Parts.governs`).
     """
@@ -139,7 +171,11 @@ def settled(
             values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)
         told, claimed = model.verdict(key, values)
         value, record = values[told.speaker], Audit(key, values, told.speaker)
-    speaker, _, _, spread = told
+    speaker, probability, _, spread = told
+    if speaker == OWN and key.winner > 0:
+        rests = odds.together(parts.relied_on(model) if relied_on is None else relied_on)
+        probability = probability * rests if rests < 1.0 else probability
+    odds.add((target.type, target.property), probability)
     roles = one.roles
     outcome = _outcome(one, speaker, claimed=claimed, known=bool(model.calibration.trials))
     if speaker == OWN:
@@ -163,7 +199,7 @@ def settled(
         margin,
         one.frame,
         spread,
-        told.probability,
+        probability,
         told.interval,
         record,
     )
@@ -272,6 +308,7 @@ def predict_many(
     probabilities: list[NDArray[np.float64]] = []
     intervals: list[NDArray[np.float64]] = []
     lost: dict[tuple[str, str], NDArray[np.bool_]] = {}
+    odds: dict[tuple[str, str], NDArray[np.float64]] = {}
     nowhere = np.zeros(len(vectors), dtype=bool)
     motion = None if parts.laws is None else parts.laws.speak(percept)
     for target in parts.targets:
@@ -289,7 +326,14 @@ def predict_many(
             # What is unexplained has a value only if a mode gave it, one that is too often the wrong one.
             verdict.modes[~(known | told & (verdict.outcomes == _UNEXPLAINED))] = 0
             column = layout.column(index, target.property)
-            values, probability, interval = _settled_many(parts, target, percept, index, following, verdict)
+            rests = np.ones(len(vectors))
+            read = parts.relied_on(parts.models[target])
+            for pair in odds:
+                if pair in read:
+                    rests *= odds[pair]
+            values, probability, interval = _settled_many(
+                parts, target, percept, index, following, verdict, rests
+            )
             following[:, column] = values
             # What is claimed after all is known, though the answer is undecided.
             known = verdict.outcomes == _PREDICTED
@@ -297,6 +341,8 @@ def predict_many(
             intervals.append(interval)
             key = (target.type, target.property)
             lost[key] = lost.get(key, nowhere) | ~known
+            before = odds.get(key, np.ones(len(vectors)))
+            odds[key] = np.where(probability < before, probability, before)
             keys.append((layout.names[index], target.property))
             verdicts.append(verdict)
     derive(parts.schema, layout, vectors, following)
@@ -312,8 +358,12 @@ def _settled_many(
     index: int,
     following: NDArray[np.float64],
     verdict: Verdict,
+    rests: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """`settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place."""
+    """`settled` of n scenes: values, probabilities and intervals, shape ``(n,)`` each; outcomes change in place.
+
+    `rests`: how probably all that the target's modes rely on is right, shape ``(n,)``.
+    """
     model = parts.models[target]
     said = _experts(parts, target, percept, index, following, verdict.values)
     values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))
@@ -327,6 +377,8 @@ def _settled_many(
             some = part[rows]
             values[some] = said[some, told.speaker]
             probability[some], interval[some] = told.probability, told.interval
+            if told.speaker == OWN and key.winner > 0:
+                probability[some] = told.probability * rests[some]
             if told.speaker == LATEST and key.winner:
                 verdict.modes[some] = model.latest
             before = verdict.outcomes[some]

@@ -34,7 +34,7 @@ from relgym.model.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.querying import Said, derive, settled
+from relgym.model.querying import Odds, Said, derive, settled
 from relgym.model.regression import Regression
 from relgym.model.rolling import BatchRollout
 from relgym.model.scenes import scene_of, wrap
@@ -400,6 +400,7 @@ class Runner:
         if told is None:
             return None
         following, own, parts = now.copy(), True, self._parts
+        odds = Odds()
         found: list[Prediction] = []
         after, outcomes, modes, margins, noted, players, _, _, experts, far = told
         for k, teller in enumerate(self._tellers):
@@ -411,7 +412,8 @@ class Runner:
             model, lawful = teller.model, a.component >= 0
             others = None if model.candidates else teller.values(said, numbers)
             away = far[k] if far[k] and raw.mode and not lawful and model.tells_how_far else 0
-            one = settled(parts, model, percept, teller.index, following, raw, others, away, lawful=lawful)
+            known = raw, odds, others, away, teller.relied_on
+            one = settled(parts, model, percept, teller.index, following, *known, lawful=lawful)
             following[a.column] = one.value
             found.append(one)
             same = one.value == after[a.column]
@@ -533,13 +535,15 @@ class _Teller:
         The answer, and the model of its target.
     target, index
         Which property of which object it is of.
+    relied_on
+        See `Parts.relied_on`.
     spoken
         Who speaks in each belief, and what that one left lately, in the order on the tape; empty: nothing is believed.
     """
 
     __slots__ = (
         *("_body_names", "_fixed", "_frame", "_modes", "_spreads"),
-        *("answer", "index", "model", "spoken", "target"),
+        *("answer", "index", "model", "relied_on", "spoken", "target"),
     )
 
     def __init__(self, parts: Parts, layout: SceneLayout, answer: Answer, frame: str) -> None:
@@ -555,6 +559,7 @@ class _Teller:
         index = self.index = layout.index(answer.object)
         model = self.model = parts.property_model(layout.types[index].name, answer.property)
         self.target = model.target
+        self.relied_on = parts.relied_on(model)
         situation = Situation(Percept(parts.perception, layout, np.empty((0, layout.width)), None), index)
         signature = situation.signature
         gather = parts.perception.gather(layout, signature, tuple(situation.plain.tolist())).tolist()

@@ -34,6 +34,7 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
     """
     beliefs: dict[tuple[str, str], tuple[ir.Belief, ...]] = {}
     answers = []
+    keys = {(layout.types[layout.index(a.object)].name, a.property): a.key for a in program.answers}
     for a in program.answers:
         index = layout.index(a.object)
         model = parts.property_model(layout.types[index].name, a.property)
@@ -49,7 +50,9 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))
         distant = model.tells_how_far and a.regression is not None
-        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, distant)))
+        relied_on = parts.relied_on(model)
+        rests = tuple(number for pair, number in keys.items() if pair in relied_on and number in a.needs)
+        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, distant, rests)))
     return replace(program, answers=tuple(answers))
 
 

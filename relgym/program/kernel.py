@@ -1743,7 +1743,11 @@ def settled(s, a, k, value, outcome, mode, margin, able):
     place = s.believed[k, 1]
     said, sure = s.code[trust + 2] + 2 * place, s.code[trust + 3] + 2 * place
     speaker, claimed = s.code[said], s.code[said + 1]
-    s.sure[k, 0], s.sure[k, 1] = s.numbers[sure], s.numbers[sure + 1]
+    rests, read = 1.0, s.code[trust + 6]
+    if speaker == OWN and winner > 0:  # its record is of steps in which what it relies on was right
+        for j in range(s.code[read]):
+            rests *= s.odds[s.code[read + 1 + j]]
+    s.sure[k, 0], s.sure[k, 1] = s.numbers[sure] * rests, s.numbers[sure + 1]
     if not claimed:
         outcome = UNSURE if outcome == PREDICTED else outcome
     elif outcome == UNEXPLAINED and winner:
@@ -1765,7 +1769,7 @@ def step(s, settling, telling):
             return TOO_MANY
     s.fitted[0] = 0
     for k in range(s.code[KEYS]):
-        s.lost[k] = 0
+        s.lost[k], s.odds[k] = 0, 1.0
     for k in range(s.code[ANSWERS]):
         a = s.code[s.code[AT_ANSWERS] + k]
         column = s.code[a]
@@ -1811,6 +1815,8 @@ def step(s, settling, telling):
             x[width + column] = value
         if lost:
             s.lost[s.code[a + 1]] = 1
+        if s.sure[k, 0] < s.odds[s.code[a + 1]]:
+            s.odds[s.code[a + 1]] = s.sure[k, 0]
     for k in range(s.code[KINEMATICS]):
         at = s.code[AT_KINEMATICS] + 3 * k
         x[width + s.code[at]] = x[s.code[at]] + s.numbers[s.code[at + 2]] * x[s.code[at + 1]]

@@ -588,12 +588,15 @@ class Trust:
         The mode that held last; 0 where nobody asks it.
     distant
         Whether kinds of what modes say far from what was learned have the bin of that instead of a lead.
+    rests
+        Keys of answers that modes rely on, ascending: their record is of steps in which these were right.
     """
 
     beliefs: tuple[Belief, ...]
     lawful: bool
     latest: int
     distant: bool = False
+    rests: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

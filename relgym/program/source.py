@@ -571,12 +571,12 @@ class _Source:
             name = self._called(number)
             latest = f"({trust.latest}, {name}_mode_{trust.latest})" if trust.latest else "None"
             squares = self._regression(name, a.regression) if a.regression is not None else "None"
-            kind = f"{trust.lawful}, {trust.distant}"
+            kind = f"{trust.lawful}, {trust.distant}, {trust.rests!r}"
             told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind}, {latest}, {squares})")
         add(
-            "# beliefs; whether of laws, and by how far a scene lies from what was learned; the mode that held last;"
+            "# beliefs; whether of laws, and by how far a scene lies from what was learned; keys that modes rely on;"
         )
-        add("# regressions; of each answer below")
+        add("# the mode that held last; regressions; of each answer below")
         add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
 
     def _fit(self, number: int, fit: ir.Fit) -> None:
@@ -615,9 +615,7 @@ class _Source:
         scene = "Scene(x)" if p.bodies else "None"
         plain = "        value = value if finite else guess"
         if any(a.trust is not None for a in p.answers):
-            plain = (
-                "        value, outcome, mode, sure = settled(number, value, outcome, mode, margin, guess, x)"
-            )
+            plain = "        value, outcome, mode, sure = settled(number, value, outcome, mode, margin, guess, x, odds)"
         registers = str(p.registers - 2 * p.width)
         add(_STEP.replace("REGISTERS", registers).replace("SCENE", scene).replace("SETTLED", plain))
 
@@ -676,7 +674,7 @@ _STEP = '''def step(now):
     right, and the half width of its 95 % interval.
     """
     x = [*now, *now, math.nan, 0.0, 1.0] + [math.nan] * (REGISTERS - 3)
-    scene, lost, told = SCENE, set(), []
+    scene, lost, odds, told = SCENE, set(), {}, []
     for number, (answer, column, key, needs) in enumerate(ANSWERS):
         value, outcome, mode, margin, guess = answer(x, scene)
         if not lost.isdisjoint(needs):
@@ -692,6 +690,8 @@ SETTLED
             x[NEXT + column] = value
         if outcome != PREDICTED:
             lost.add(key)
+        if sure[0] < odds.get(key, 1.0):
+            odds[key] = sure[0]
         told.append((outcome, mode, margin, *sure))
     for place, size, rate in KINEMATICS:
         x[NEXT + place] = x[place] + size * x[rate]
@@ -798,11 +798,11 @@ def situation(used, near, target, stands):
 '''
 
 _TRUST = '''
-def settled(number, value, outcome, mode, margin, guess, x):
+def settled(number, value, outcome, mode, margin, guess, x, odds):
     """Value, outcome and mode of a prediction, once it is known how right such ones were, and how sure that is."""
     if TRUST[number] is None:
         return value if math.isfinite(value) else guess, outcome, mode, (math.nan, math.nan)
-    beliefs, lawful, distant, latest, squares = TRUST[number]
+    beliefs, lawful, distant, rests, latest, squares = TRUST[number]
     present = x[NEXT + ANSWERS[number][1]]
     last = latest[1](x) if latest else math.nan
     linear, products, far = regressed(x, *squares) if squares else (math.nan, math.nan, 0.0)
@@ -818,6 +818,8 @@ def settled(number, value, outcome, mode, margin, guess, x):
     known = beliefs.get((kind, winner, lead, able)) or beliefs.get((kind, winner, -1, able))
     known = known or beliefs[kind, (winner > 0) - (winner < 0), -2, able]
     speaker, probability, interval, claimed = known
+    if EXPERTS[speaker] == "own" and winner > 0:  # its record is of steps in which what it relies on was right
+        probability *= math.prod(odds.get(key, 1.0) for key in rests)
     if not claimed:
         outcome = UNSURE if outcome == PREDICTED else outcome
     elif outcome == UNEXPLAINED and winner:

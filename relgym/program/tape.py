@@ -136,6 +136,7 @@ def space_of(most: Sizes) -> np.dtype[np.void]:
         ("order", np.int64, (3, modes)),
         ("hashes", np.uint64, (3, bodies + 1)),
         ("lost", np.int64, (most.keys,)),  # properties that could not be predicted
+        ("odds", np.float64, (most.keys,)),  # how probably those that were are right, at least
         ("lineup", np.int64, (1, bodies)),  # bodies in canonical order
         ("options", np.float64, ((most.roles + 1) ** 2, 4)),  # candidates of roles
         ("cast", np.int64, (5, max(bodies, most.roles) + 2)),
@@ -577,7 +578,8 @@ class _Writer:
         kinds = self.put(*map(_kind, some))
         said = self.put(*(v for each in some for v in (each.speaker, each.claimed)))
         at = self.num(*(v for each in some for v in (each.probability, each.interval)))
-        return self.put(len(some), kinds, said, at, trust.lawful, trust.distant)
+        rests = self.put(len(trust.rests), *trust.rests)
+        return self.put(len(some), kinds, said, at, trust.lawful, trust.distant, rests)
 
     def _fit(self, fit: ir.Fit) -> int:
         """How many columns, which, their centres and scales; then of each regression where its leverage is told.

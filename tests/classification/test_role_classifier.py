@@ -144,6 +144,39 @@ def _touched(touching: Sequence[tuple[int, ...]]) -> tuple[RoleClassifier, Exemp
     return classifier, exemplars
 
 
+def test_descriptions_learned_in_pieces_are_those_learned_at_once() -> None:
+    items = list(truck_stream(48, rng=np.random.default_rng(0), bystanders=2))
+    whole, exemplars, _ = _learned(items)
+    for mode in TRUCK_KINDS:
+        known = RoleClassifier(TRUCK_VOCABULARY, _kinds(mode), _CONFIG)
+        calls = 0
+        while known.stale:
+            spent = known.refresh(exemplars, mode, budget=1.0)
+            calls += spent > 0
+            if calls == 2:
+                known = pickle.loads(pickle.dumps(known))  # begun, and gone on with elsewhere
+        again = RoleClassifier(TRUCK_VOCABULARY, _kinds(mode), _CONFIG)
+        again.refresh(exemplars, mode)
+        assert known.to_dict() == again.to_dict()
+        assert calls > 1 or not any(d.definition for d in known.descriptions)
+    assert set(whole) == set(TRUCK_KINDS)
+
+
+def test_what_comes_while_descriptions_are_learned_counts_against_them() -> None:
+    classifier, exemplars = _touched([(1,)] * 4)
+    assert classifier.errors == 0.0
+    classifier.stale = True
+    assert classifier.refresh(exemplars, 1, budget=0.0) > 0  # begun
+    assert classifier.stale
+    odd = _balls({2}, set())  # the one that doesn't touch
+    classifier.observe(odd, (1,))
+    exemplars.add(odd, 1, np.ones(1, bool), np.zeros(1), roles=(1,))
+    classifier.refresh(exemplars, 1)
+    assert not classifier.stale
+    assert classifier.describe() == ["ball: intersect(A, B)"]
+    assert classifier.errors == 2.0  # it misses one and takes another one
+
+
 def test_who_has_all_that_players_had_in_common_comes_first(
     trucks: tuple[dict[int, RoleClassifier], Exemplars, int],
 ) -> None:

@@ -1189,6 +1189,59 @@ def test_a_miss_that_a_law_explains_counts_once() -> None:
     assert known._cells[KEY].steady == 0
 
 
+# ---------------------------------------------------------------------- who isn't to blame
+def until_claimed(known: Calibration, probability: float) -> int:
+    """How often the winner has to be right until that is so probable."""
+    for n in range(200):
+        if known.assess(KEY, values(own=1.0)).probability > probability:
+            return n
+        seen(known, values(own=1.0), 1.0)
+    raise AssertionError("never")
+
+
+def test_a_mode_whose_conditions_were_revised_begins_anew() -> None:
+    known = right(5)
+    for _ in range(3):
+        seen(known, values(own=1.5), 1.0)
+    assert known.assess(KEY, values(own=1.0)).probability < 0.9
+    unlike = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    known.revise({1})
+    unlike.revise({2})  # another one
+    needed = [until_claimed(each, 0.9) for each in (known, unlike)]
+    assert needed[0] <= 8
+    assert needed[1] >= 4 * needed[0]
+
+
+def test_who_fails_after_each_revision_is_believed_later_each_time() -> None:
+    known, needed = right(5), []
+    for _ in range(4):
+        seen(known, values(own=1.5), 1.0)
+        known.revise({1})
+        needed.append(until_claimed(known, 0.95))
+    assert needed == sorted(needed)
+    assert needed[-1] > needed[0]
+    again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    assert again.to_json() == known.to_json()
+    assert again.assess(KEY, values(own=1.0)) == known.assess(KEY, values(own=1.0))
+
+
+def test_a_revision_says_nothing_of_what_was_always_right() -> None:
+    known = right(20)
+    before = known.to_json()
+    known.revise({1})
+    assert known.to_json() == before
+
+
+def test_what_was_misled_is_a_slip_and_no_miss() -> None:
+    known, misled = right(20), right(20)
+    audit = Audit(KEY, values(own=1.5), OWN)
+    misled.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
+    assert misled.to_json()["cells"] == known.to_json()["cells"]
+    assert misled.assess(KEY, values(own=1.0)) == known.assess(KEY, values(own=1.0))
+    assert misled.slips == pytest.approx(1.0 / 21.0)
+    assert misled.trials == 21
+
+
 def test_of_two_models_together_all_is_learned_from_at_first() -> None:
     known = right(1)
     for _ in range(1_000):

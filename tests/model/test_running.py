@@ -5,12 +5,13 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from dreams import LINE_STEPS, cart_model, line_model, room_model
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from programs import MODELS, arrays, looked_back, scenes_of
+from programs import MODELS, arrays, assert_alike, looked_back, scenes_of
 from worlds import LINE_TARGETS, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
@@ -24,6 +25,7 @@ from relgym.model.querying import predict
 from relgym.model.world_model import WorldModel
 from relgym.program.records import BeyondError
 from relgym.scene.objects import Scene
+from relgym.wrappers import ModelLearner
 
 
 @pytest.fixture(autouse=True)
@@ -201,3 +203,33 @@ def test_a_late_audit_is_worked_out_once_and_copied_as_what_it_says() -> None:
     assert late() == late() == copied() == audit
     assert (copied.key, copied.speaker) == (audit.key, 0)
     assert asked == [1]
+
+
+def test_who_reads_another_prediction_is_right_as_probably_as_both() -> None:
+    # box.px' = px + truck.vx', the latter from modes of which it isn't known yet when they hold.
+    env = ModelLearner(gym.make("relgym/TruckPush-v0"))
+    env.action_space.seed(3)
+    env.reset(seed=3)
+    scenes = []
+    for _ in range(150):
+        *_, terminated, truncated, info = env.step(env.action_space.sample())
+        scenes.append(info["relgym"].transition.before)
+        if terminated or truncated:
+            env.reset()
+    model = env.model
+    assert isinstance(model, WorldModel)
+    vectors = np.array([scene.vector for scene in scenes[-60:]])
+    assert_alike(model._parts, scenes[0].layout, vectors)
+    compared = 0
+    for scene in scenes[-60:]:
+        known = model.predict_one(scene)
+        truck = known["truck", "vx"]
+        for name in ("box1", "box2", "box3"):
+            box = known[name, "px"]
+            if not (truck.ok and box.mode):
+                continue
+            calibration = model.property_model("box", "px").calibration
+            own = calibration.assess(box.audit.key, box.audit.values).probability
+            assert box.probability == own * truck.probability
+            compared += truck.probability < 1.0
+    assert compared > 20

@@ -405,6 +405,8 @@ class _TargetCheck:
         every: list[StopRecord | LandingRecord] = [*model.stops.stops, *model.stops.landings]
         voting = set(model.classifier.modes)
         where = f"{self.where}.limits, stops or past"
+        for mode in model.amended:
+            _require(mode in ids, f"{self.where}.amended", f"there is no mode {mode}")
         for mode in (*(bound[0] for bound in limits), *(each.mode for each in every), *model.past):
             _require(mode in ids, where, f"there is no mode {mode}")
             _require(mode not in voting, where, f"mode {mode} takes part in the vote")

@@ -411,6 +411,7 @@ class PropertyRecord(Record):
     candidates: CandidatesRecord | None = None
     stops: StopsRecord = field(default_factory=StopsRecord)
     past: list[ModeId] = []
+    amended: list[ModeId] = []
     latest: ModeOrNoise = 0
     unsettled: bool = False
 
@@ -452,7 +453,7 @@ Kind: TypeAlias = tuple[
 ]
 
 
-Runs: TypeAlias = Annotated[list[Weight], Meta(min_length=4, max_length=6)]
+Runs: TypeAlias = Annotated[list[Weight], Meta(min_length=4, max_length=7)]
 
 
 class CellRecord(Record):
@@ -460,9 +461,10 @@ class CellRecord(Record):
 
     A record is an expert, trials, hits, the run under way, bins of errors, and of runs that are over the trials in
     those of misses and of hits, and how many there were, maybe then the mean lengths of those of hits in the two
-    records before this one that misses ended; squares are trials, the expert's own and those of saying that
-    nothing changes. Steady are predictions in a row, up to now, that came out as such ones do, passed those of them for
-    which the next one that is learned from stands; doubt are bits by which intervals held less often than they are to.
+    records before this one that misses ended, and how often the mode was revised; squares are trials, the expert's own
+    and those of saying that nothing changes. Steady are predictions in a row, up to now, that came out as such ones do,
+    passed those of them for which the next one that is learned from stands; doubt are bits by which intervals held less
+    often than they are to.
     """
 
     key: Kind

@@ -80,13 +80,22 @@ class Casting:
             known = self.classifiers[mode.id] = RoleClassifier(self.vocabulary, kinds, self.config)
         return known.observe(example, roles, weight)
 
-    def refresh(self, exemplars: Exemplars, budget: float) -> int:
-        """Learn stale descriptions anew as far as the budget goes; the work spent."""
+    @property
+    def flawed(self) -> set[int]:
+        """Modes whose descriptions err, or wait to be learned anew."""
+        return {number for number, known in self.classifiers.items() if known.errors > 0 or known.stale}
+
+    def refresh(self, exemplars: Exemplars, budget: float, amended: set[int] | None = None) -> int:
+        """Learn stale descriptions anew as far as the budget goes; the work spent. Their modes go to `amended`."""
         spent = 0
         for number in sorted(self.classifiers):
             if spent >= budget:
                 break
-            spent += self.classifiers[number].refresh(exemplars, number, budget - spent)
+            known = self.classifiers[number]
+            stale = known.stale
+            spent += known.refresh(exemplars, number, budget - spent)
+            if amended is not None and stale and not known.stale:
+                amended.add(number)
         return spent
 
     def assign(

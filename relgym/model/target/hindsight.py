@@ -273,21 +273,23 @@ class _Look:
         target, model, _, _, turn = answer
         came, audit = part.value + residual, part.audit
         rounding = self._rounding(came)
+        misled = self._misled(answer)
+        deceived = misled and not self._off.isdisjoint(self._parts.relied_on(model))
         if audit is not None:
             rounding = max(rounding, self._least)
-            error = self._parts.config.claim_error
             model.calibration.look_back(
                 audit,
                 came,
                 claimed=part.ok,
                 rounding=rounding,
-                error=error,
+                error=self._parts.config.claim_error,
                 turn=turn,
                 times=self._times,
                 stands=self._stands,
+                misled=deceived and audit.speaker == OWN and audit.key.winner > 0,
             )
         self._note(answer, residual, rounding)
-        if not part.mode or self._parts.governs(target) or self._misled(answer):
+        if not part.mode or self._parts.governs(target) or misled:
             return
         spread = STDS * part.spread if part.spread == part.spread else 0.0
         if audit is not None and audit.speaker != OWN:  # another one gave the value, and the spread

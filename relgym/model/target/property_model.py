@@ -19,7 +19,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import HOPELESS, SEARCHED_CELLS
+from relgym.config.constants import HOPELESS, LEFT_OPEN, SEARCHED_CELLS
 from relgym.model.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
 from relgym.model.grouping import distinct, members
 from relgym.model.perception import Percept, Situation
@@ -88,6 +88,8 @@ class PropertyModel:
         Which modes are walls at work: they take no part in the vote either.
     past
         Ids of modes that have ended (`relgym.model.target.ended`): nor do they.
+    amended
+        Ids of modes of which it was learned again when they hold, or whose objects, or where a limit cuts them off.
     hindsight
         How the latest predictions came out, if somebody looked back at them.
     calibration
@@ -118,6 +120,7 @@ class PropertyModel:
         self.limits = Limits()
         self.stops = Stops()
         self.past: set[int] = set()
+        self.amended: set[int] = set()
         self.hindsight = Hindsight()
         self.candidates = Candidates(config.hypotheses)
         self.calibration = Calibration(config.claim_probability, config.claim_slips, len(config.hypotheses))
@@ -371,8 +374,19 @@ class PropertyModel:
     def refresh(self, budget: int | None) -> int:
         """Re-learn stale classifiers within a budget of work (None: all); returns the work spent."""
         left = float("inf") if budget is None else budget
-        spent = self.classifier.refresh(left)
-        return spent + self.casting.refresh(self.classifier.exemplars, left - spent)
+        spent = self.classifier.refresh(left, self.amended)
+        spent += self.casting.refresh(self.classifier.exemplars, left - spent, self.amended)
+        if self.amended and self._accounted_for:
+            revised = self.amended & self.classifier.flawless - self.casting.flawed
+            self.amended -= revised
+            self.calibration.revise(revised)
+        return spent
+
+    @property
+    def _accounted_for(self) -> bool:
+        """Whether laws explain what was seen: else what a mode got wrong may be what nothing explains."""
+        known = self.clusterer
+        return not known.approximate and known.noise_examples <= LEFT_OPEN * known.seen
 
     def reconsider(self, table: ExampleTable, budget: Budget) -> None:
         """Guess anew where nothing is explained, and ask for hypotheses, if it is time, as far as the budget goes."""
@@ -417,7 +431,7 @@ class PropertyModel:
         """The set of modes changed: what the classifiers remember is labelled anew."""
         self.functions.bound.clear()
         self.fallback.bound.clear()
-        self.limits = find_limits(self.clusterer, table)
+        before, self.limits = self.limits, find_limits(self.clusterer, table)
         self.stops = self._find_stops(table)
         numbers = self.classifier.exemplars.rows.astype(np.intp)
         known, fits = self.clusterer.fits(table, numbers)
@@ -427,6 +441,7 @@ class PropertyModel:
         values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
         labels = self.clusterer.labels[numbers].astype(np.int64)
         self.calibration.keep(ids)
+        self.amended = set(ids) if self.limits != before else self.amended.intersection(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self.functions.recast(table, self.classifier.exemplars)
@@ -760,6 +775,7 @@ class PropertyModel:
             "limits": self.limits.to_json(),
             "stops": self.stops.to_json(),
             **({"past": sorted(self.past)} if self.past else {}),
+            **({"amended": sorted(self.amended)} if self.amended else {}),
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -783,6 +799,7 @@ class PropertyModel:
         self.limits = Limits.from_json(data.get("limits", {}))
         self.stops = Stops.from_json(data.get("stops", {}))
         self.past = {int(mode) for mode in data.get("past", ())}
+        self.amended = {int(mode) for mode in data.get("amended", ())}
         self.functions.bound.clear()
         self.fallback.bound.clear()
 
