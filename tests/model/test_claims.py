@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import count, islice, pairwise
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from points import schema_of
@@ -19,6 +21,7 @@ from relgym.model.world_model import WorldModel
 from relgym.reporting.parser import parse_rules
 from relgym.scene.objects import Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
+from relgym.wrappers import ModelLearner
 
 Row = tuple[float, ...]
 Numbers = Iterator[Row]
@@ -352,3 +355,22 @@ def test_the_record_goes_with_the_model(tmp_path: object) -> None:
     assert batch.probabilities[:, 0].tolist() == [part.probability for part in told]
     assert batch.intervals[:, 0].tolist() == [part.interval for part in told]
     assert [bool(ok) for ok in batch.ok] == [part.ok for part in told]
+
+
+def test_what_rests_on_an_approximation_is_as_uncertain_as_it_comes_out() -> None:
+    # x' = x + v' exactly, v' only roughly: never quite right, which isn't a fault that another one is to blame for.
+    env = ModelLearner(gym.make("MountainCar-v0"))
+    env.action_space.seed(0)
+    env.reset(seed=0)
+    held: list[bool] = []
+    for step in range(800):
+        *_, terminated, truncated, info = env.step(env.action_space.sample())
+        report = info["relgym"]
+        for part in report.prediction.parts if step >= 400 else ():
+            off = report.residuals[part.object, part.property]
+            if part.property == "x0" and not math.isnan(part.interval):
+                held.append(abs(off) <= part.interval)
+        if terminated or truncated:
+            env.reset()
+    assert len(held) > 300
+    assert np.mean(held) >= 0.9

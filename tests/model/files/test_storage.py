@@ -128,6 +128,20 @@ def test_learning_goes_on_with_open_roles(tmp_path: Path) -> None:
     assert (tmp_path / "model").read_bytes() == (tmp_path / "whole").read_bytes()
 
 
+def test_modes_whose_conditions_were_learned_again_are_kept(room_model: WorldModel, tmp_path: Path) -> None:
+    model = copy.deepcopy(room_model)
+    target = next(t for t in model.targets if model.modes(t.type, t.property))
+    part = model.property_model(target.type, target.property)
+    part.amended = {part.modes[0].id}
+    model.save(tmp_path / "model.json", history=True)
+    again = WorldModel.load(tmp_path / "model.json")
+    assert again.property_model(target.type, target.property).amended == part.amended
+    part.amended = {10_000}
+    model.save(tmp_path / "other.json", history=True)
+    with pytest.raises(ModelFileError, match="there is no mode 10000"):
+        WorldModel.load(tmp_path / "other.json")
+
+
 def test_without_its_history_a_model_only_predicts(room_model: WorldModel, tmp_path: Path) -> None:
     room_model.save(tmp_path / "model")
     again = WorldModel.load(tmp_path / "model")
