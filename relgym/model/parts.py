@@ -350,9 +350,12 @@ class Parts:
         """
         if not model.target.given:
             return frozenset()
-        known = {pair: self.property_model(*pair) for pair in model.needs}
+        needs = model.needs
         return frozenset(
-            pair for pair, read in known.items() if self.governs(read.target) or not read.fallback.guessable
+            (target.type, target.property)
+            for target, read in self.models.items()
+            if (target.type, target.property) in needs
+            and (self.governs(target) or not read.fallback.guessable)
         )
 
     def regressed(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
