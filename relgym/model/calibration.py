@@ -291,10 +291,10 @@ class _Record:
 
         One part of the prior has it that hits come in some share (`mean`). The other one, larger by so many bits, that
         what speaks is a law and always right: that holds until the first miss. Who was revised r times, and failed each
-        time, will be right with the odds of 1 to 2 r + 1 (Jeffreys' prior).
+        time, will be right with the odds of 1 to 2 r + 1 (Jeffreys' prior), whoever else is.
         """
-        some = self.mean(prior)
-        bits -= math.log2(2 * self.revised + 1)
+        failed = 2 * self.revised + 1
+        some, bits = self.mean(min(prior, 1.0 / failed)), bits - math.log2(failed)
         if self.hits < self.trials or not (self.trials or bits):
             return some
         n = (
@@ -741,7 +741,8 @@ class Calibration:
         stands
             For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
         misled
-            Whether what it read was predicted wrongly: that says nothing of what it makes of it.
+            Whether what it read was predicted wrongly: that says nothing of what it makes of it. Where it was claimed
+            all the same, it is claimed again once it was right a few times, and so what it reads.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
@@ -762,6 +763,10 @@ class Calibration:
         known = len(self._cells)
         if not misled:
             self._tally(audit, errors, within, rounding, times, stands)
+        elif claimed:
+            self._begin_anew(
+                {k for k in self._cells if k == audit.key or k == _winner(audit.key)}, failed=False
+            )
         self._changed(cells=len(self._cells) > known)
 
     def _tally(
@@ -861,13 +866,20 @@ class Calibration:
 
     def revise(self, modes: Collection[int]) -> None:
         """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more."""
-        for key, cell in self._cells.items():
-            own = cell.records.get(OWN)
-            if key.winner in modes and key.lead != OF_FAMILY and own is not None and own.hits < own.trials:
-                cell.records[OWN] = _Record(revised=own.revised + 1)
-                cell.squares[OWN] = [0.0, 0.0, 0.0]
-                cell._sure = None
+        of = {k: c.records[OWN] for k, c in self._cells.items() if k.winner in modes and OWN in c.records}
+        erring = {k for k, own in of.items() if k.lead != OF_FAMILY and own.hits < own.trials}
+        self._begin_anew(erring, failed=True)
         self._changed()
+
+    def _begin_anew(self, keys: Collection[Key], *, failed: bool) -> None:
+        """The winner's record in some cells begins anew, with the credit of who failed once at most, or once more."""
+        for key in keys:
+            cell = self._cells[key]
+            before = cell.records.get(OWN, _Record()).revised
+            cell.records[OWN] = _Record(revised=before + 1 if failed else max(before, 1))
+            cell._sure = None
+            if failed:
+                cell.squares[OWN] = [0.0, 0.0, 0.0]
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""

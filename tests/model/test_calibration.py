@@ -1232,14 +1232,21 @@ def test_a_revision_says_nothing_of_what_was_always_right() -> None:
     assert known.to_json() == before
 
 
-def test_what_was_misled_is_a_slip_and_no_miss() -> None:
+def test_what_was_misled_is_no_miss() -> None:
     known, misled = right(20), right(20)
     audit = Audit(KEY, values(own=1.5), OWN)
-    misled.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
+    misled.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, misled=True)
     assert misled.to_json()["cells"] == known.to_json()["cells"]
     assert misled.assess(KEY, values(own=1.0)) == known.assess(KEY, values(own=1.0))
-    assert misled.slips == pytest.approx(1.0 / 21.0)
     assert misled.trials == 21
+    assert misled.slips == 0.0
+
+
+def test_what_was_claimed_and_misled_is_claimed_again_soon() -> None:
+    misled, audit = right(20), Audit(KEY, values(own=1.5), OWN)
+    misled.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
+    assert misled.slips == pytest.approx(1.0 / 21.0)
+    assert 2 <= until_claimed(misled, 0.9) <= 4  # after a miss of its own it takes thirty
 
 
 def test_of_two_models_together_all_is_learned_from_at_first() -> None:
