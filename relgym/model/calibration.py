@@ -741,8 +741,8 @@ class Calibration:
         stands
             For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
         misled
-            Whether what it read was predicted wrongly: that says nothing of what it makes of it. Where it was claimed
-            all the same, it is claimed again once it was right a few times, and so what it reads.
+            Whether what it read was predicted wrongly: that says nothing of what it makes of it. Who was claimed all
+            the same, and hadn't been right for long, is claimed again once he was right a few times.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
@@ -764,9 +764,7 @@ class Calibration:
         if not misled:
             self._tally(audit, errors, within, rounding, times, stands)
         elif claimed:
-            self._begin_anew(
-                {k for k in self._cells if k == audit.key or k == _winner(audit.key)}, failed=False
-            )
+            self._suspend(audit.key)
         self._changed(cells=len(self._cells) > known)
 
     def _tally(
@@ -870,6 +868,15 @@ class Calibration:
         erring = {k for k, own in of.items() if k.lead != OF_FAMILY and own.hits < own.trials}
         self._begin_anew(erring, failed=True)
         self._changed()
+
+    def _suspend(self, key: Key) -> None:
+        """What was claimed read what was wrong: once in a while that happens, but what it reads may go on so."""
+        for each in {key, _winner(key)} & self._cells.keys():
+            own = self._cells[each].records.get(OWN)
+            if own is not None and own.run >= FEW:
+                own.run = 0
+            else:
+                self._begin_anew([each], failed=False)
 
     def _begin_anew(self, keys: Collection[Key], *, failed: bool) -> None:
         """The winner's record in some cells begins anew, with the credit of who failed once at most, or once more."""
