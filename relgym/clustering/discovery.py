@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
-from relgym.config.constants import EXTRAPOLATED, PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
-from relgym.numeric.ransac import CLOSE, Consensus, consensus, refine
+from relgym.config.constants import PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED
+from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
     LinearFit,
     fitting_cells,
@@ -271,9 +271,7 @@ def _in_any_order(
     rng: np.random.Generator,
 ) -> Steps[Consensus | None]:
     """A function that enough rows obey, each in the order of its objects that suits (`relgym.clustering.exchange`)."""
-    loose = (
-        EXTRAPOLATED if scale.misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / scale.sigma))
-    )
+    loose = extrapolated(y, scale.sigma, misfit=scale.misfit)
     for reading in readings(x, orders):
         least = max(needed, least_examples(y, scale, config, choices=len(reading.orders)))
         fits = yield from reading.candidates(

@@ -32,7 +32,7 @@ from relgym.numeric.stepwise import (
 )
 from relgym.scheduling.work import CALL, Steps, resumable
 
-__all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "refine"]
+__all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "extrapolated", "refine"]
 
 CLOSE = 0.01
 """Samples are extrapolated with a wider tolerance (`EXTRAPOLATED`), but not so wide, where there is noise, that it
@@ -101,6 +101,11 @@ def draw_samples(
     return found
 
 
+def extrapolated(y: NDArray[np.float64], sigma: float, *, misfit: bool) -> float:
+    """Standard deviations within which all rows may lie of a function through a few of them, at first."""
+    return EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / sigma))
+
+
 @resumable
 def consensus(
     x: NDArray[np.float64],
@@ -146,7 +151,7 @@ def consensus(
     n = len(y)
     if n < size:
         return None
-    loose = EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / sigma))
+    loose = extrapolated(y, sigma, misfit=misfit)
     columns = varying_columns(x)
     samples = yield from draw_samples.steps(
         n, size, draws, rng=rng, strata=strata, apart=apart, anchors=anchors
