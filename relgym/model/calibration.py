@@ -320,6 +320,8 @@ class _Cell:
     steady: int = 0
     passed: int = 0  # predictions left out lately: the next one that is learned from stands for these, too
     doubt: float = 0.0  # bits by which a winner's intervals held less often lately than they are to
+    # Hits in a row since the winner was claimed though what it read was predicted wrongly; None: that is over.
+    since: int | None = None
     _sure: tuple[float, float] | None = field(
         default=None, repr=False, compare=False
     )  # by bits, since the last trial
@@ -383,6 +385,12 @@ class _Cell:
                 for place, count in record.errors.items():
                     known.errors[place] = known.errors.get(place, 0.0) + count
         return found
+
+    def credit(self, prior: float, bits: float) -> float:
+        """How probably what the winner reads is right again: as what failed once, and was right ever since."""
+        if self.since is None:
+            return 1.0
+        return _Record(self.since, self.since, revised=1).share(prior, bits)
 
     def drop(self, expert: int) -> None:
         """Forget how an expert did: another one takes its place."""
@@ -584,12 +592,12 @@ class Calibration:
             if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
                 speaker = PERSISTENCE
             known = [trusted]
-        latest = next(
-            (c.records[speaker] for c in (cell, winner) if c is not None and speaker in c.records), _Record()
-        )
-        share = (
-            latest.share(_mean(family, speaker), bits if speaker == OWN else 0.0) if self.trials else math.nan
-        )
+        latest = next((c for c in (cell, winner) if c is not None and speaker in c.records), None)
+        said = _Record() if latest is None else latest.records[speaker]
+        prior, bits = _mean(family, speaker), bits if speaker == OWN else 0.0
+        share = said.share(prior, bits) if self.trials else math.nan
+        if latest is not None and speaker == OWN:
+            share = min(share, latest.credit(prior, bits))
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
@@ -742,7 +750,7 @@ class Calibration:
             For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
         misled
             Whether what it read was predicted wrongly: that says nothing of what it makes of it. Who was claimed all
-            the same, and hadn't been right for long, is claimed again once he was right a few times.
+            the same is claimed again once he was right a few times.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
         errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
@@ -764,7 +772,7 @@ class Calibration:
         if not misled:
             self._tally(audit, errors, within, rounding, times, stands)
         elif claimed:
-            self._suspend(audit.key)
+            self._pause(audit.key)
         self._changed(cells=len(self._cells) > known)
 
     def _tally(
@@ -780,6 +788,10 @@ class Calibration:
                 cell.note(audit.speaker, errors, within, many)
             else:
                 cell.count(errors, within, many)
+            if cell.since is not None:
+                cell.since = cell.since + many if errors[OWN] <= within else 0
+                if cell.credit(0.5, self._bits(_who(key))) > self.probability:
+                    cell.since = None
         self._cells[audit.key].heard += max(many, stands)
         if not (times or stands) and errors[audit.speaker] > rounding:
             for key in _levels(audit.key)[1:]:
@@ -864,29 +876,18 @@ class Calibration:
 
     def revise(self, modes: Collection[int]) -> None:
         """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more."""
-        of = {k: c.records[OWN] for k, c in self._cells.items() if k.winner in modes and OWN in c.records}
-        erring = {k for k, own in of.items() if k.lead != OF_FAMILY and own.hits < own.trials}
-        self._begin_anew(erring, failed=True)
+        for key, cell in self._cells.items():
+            own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
+            if own is not None and own.hits < own.trials:
+                cell.records[OWN] = _Record(revised=own.revised + 1)
+                cell.squares[OWN] = [0.0, 0.0, 0.0]
+                cell._sure = None
         self._changed()
 
-    def _suspend(self, key: Key) -> None:
-        """What was claimed read what was wrong: once in a while that happens, but what it reads may go on so."""
+    def _pause(self, key: Key) -> None:
+        """What was claimed read what was wrong: what it reads may go on so, so it isn't claimed for a while."""
         for each in {key, _winner(key)} & self._cells.keys():
-            own = self._cells[each].records.get(OWN)
-            if own is not None and own.run >= FEW:
-                own.run = 0
-            else:
-                self._begin_anew([each], failed=False)
-
-    def _begin_anew(self, keys: Collection[Key], *, failed: bool) -> None:
-        """The winner's record in some cells begins anew, with the credit of who failed once at most, or once more."""
-        for key in keys:
-            cell = self._cells[key]
-            before = cell.records.get(OWN, _Record()).revised
-            cell.records[OWN] = _Record(revised=before + 1 if failed else max(before, 1))
-            cell._sure = None
-            if failed:
-                cell.squares[OWN] = [0.0, 0.0, 0.0]
+            self._cells[each].since = self._cells[each].steady = 0  # all of what follows is looked at
 
     def keep(self, modes: Collection[int]) -> None:
         """Forget the records of modes that are gone; those of laws stay."""
@@ -947,6 +948,12 @@ class Calibration:
         own = None if whole is None else whole.records.get(OWN)
         return math.nan if own is None or not own.trials else own.hits / own.trials
 
+    def paused(self, outcome: int) -> bool:
+        """Whether some kind isn't claimed, for what it reads was predicted wrongly."""
+        return any(
+            c.since is not None for k, c in self._cells.items() if k.outcome == outcome and k.lead >= 0
+        )
+
     def kinds(self, outcome: int) -> Iterator[tuple[Key, float, Assessment]]:
         """Each kind of predictions of an outcome, its trials, and what is made of such a prediction."""
         for key, cell in sorted(self._cells.items()):
@@ -981,6 +988,7 @@ class Calibration:
                     "steady": cell.steady,
                     "passed": cell.passed,
                     **({"doubt": cell.doubt} if cell.doubt else {}),
+                    **({} if cell.since is None else {"since": cell.since}),
                     "records": [
                         [
                             who,
@@ -1029,6 +1037,7 @@ class Calibration:
                 int(each["steady"]),
                 int(each["passed"]),
                 float(each.get("doubt", 0.0)),
+                None if (since := each.get("since")) is None else int(since),
             )
         return found
 

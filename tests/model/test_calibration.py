@@ -1246,7 +1246,31 @@ def test_what_was_claimed_and_misled_is_claimed_again_soon() -> None:
     misled, audit = right(20), Audit(KEY, values(own=1.5), OWN)
     misled.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
     assert misled.slips == pytest.approx(1.0 / 21.0)
-    assert 2 <= until_claimed(misled, 0.9) <= 4  # after a miss of its own it takes thirty
+    assert until_claimed(misled, 0.9) == 3  # after a miss of its own it takes thirty
+    assert misled.assess(KEY, values(own=1.0)) == right(23).assess(KEY, values(own=1.0))  # its record went on
+
+
+def test_claims_pause_however_many_such_ones_came_before() -> None:
+    misled, audit = right(500), Audit(KEY, values(own=1.0), OWN)
+    misled.look_back(audit, 2.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
+    assert misled.paused(KEY.outcome)
+    claimed = []
+    for _ in range(5):
+        claimed.append(misled.verdict(KEY, values(own=1.0))[1])
+        seen(misled, values(own=1.0), 1.0)
+    assert claimed == [False] * 3 + [True] * 2
+    assert not misled.paused(KEY.outcome)
+
+
+def test_a_miss_prolongs_a_pause_and_files_keep_it() -> None:
+    misled, audit = right(20), Audit(KEY, values(own=1.5), OWN)
+    misled.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, misled=True)
+    seen(misled, values(own=1.0), 1.0)
+    again = Calibration.from_json(json.loads(json.dumps(misled.to_json())), 0.9)
+    assert again.to_json() == misled.to_json()
+    assert until_claimed(again, 0.9) == 2
+    seen(misled, values(own=1.5), 1.0)
+    assert until_claimed(misled, 0.9) >= 3
 
 
 def test_of_two_models_together_all_is_learned_from_at_first() -> None:

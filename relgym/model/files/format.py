@@ -464,7 +464,7 @@ class CellRecord(Record):
     records before this one that misses ended, and how often the mode was revised; squares are trials, the expert's own
     and those of saying that nothing changes. Steady are predictions in a row, up to now, that came out as such ones do,
     passed those of them for which the next one that is learned from stands; doubt are bits by which intervals held less
-    often than they are to.
+    often than they are to; since are hits in a row after one was claimed though what it read was predicted wrongly.
     """
 
     key: Kind
@@ -475,6 +475,7 @@ class CellRecord(Record):
     records: list[tuple[Expert, Weight, Weight, Whole, Bins, Runs]]
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
     doubt: Weight = 0.0
+    since: Count | None = None
 
 
 class CalibrationRecord(Record):

@@ -232,8 +232,10 @@ def _doubt(part: PropertyModel) -> str:
     if not part.modes:
         return "no mode learned yet"
     if part.doubtful:
-        share = 100.0 * part.calibration.share(_PREDICTED)
-        return f"such predictions were right in {share:.3g} % of the latest cases, and none is claimed"
+        if part.calibration.paused(_PREDICTED):
+            return "what it reads was predicted wrongly, and not rightly again yet"
+        share = max(100.0 * told.probability for _, _, told in part.calibration.kinds(_PREDICTED))
+        return f"at best {share:.3g} % of such predictions are expected to be right, too few to claim any"
     known = part.calibration.trials and part.config.abstain
     return "nothing tells yet which of these holds" if part.undecided and not known else ""
 
