@@ -28,7 +28,7 @@ dyna: $(DYNA)    ## agents that train in what they have learned, beside SAC (ins
 	$(BIN)/relgym dyna
 
 dyna-full: $(SB3) ## all that dreaming is worth, hours; resumes where it was stopped, writes docs/results/dream.md
-	$(BIN)/python -m relgym.experiments.dyna_benchmarks --jobs 2 --page docs/results/dream.md
+	$(BIN)/relgym benchmark dyna --jobs 2 --page docs/results/dream.md
 
 plan: $(VIZ)     ## an agent that explores, prints the laws it found, and plans ten episodes (two minutes)
 	$(BIN)/relgym plan
@@ -73,7 +73,7 @@ soak: $(DEV)     ## a million transitions of BallBoxRamp and CartPole: memory, c
 	$(BIN)/python -m relgym.experiments.soak lander --steps 100000 --history 20000 --every 1000
 
 outliers: $(DEV) ## what wrong numbers in the stream cost: clean steps predicted with and without them
-	$(BIN)/python -m relgym.experiments.outliers
+	$(BIN)/relgym benchmark outliers
 
 coverage: $(DEV) ## which lines the tests never reach
 	$(BIN)/coverage run -m pytest

@@ -353,7 +353,7 @@ def dyna(
     as_json: Json = False,
 ) -> None:
     """Let SAC learn to push a truck to its goal, with a model to dream in and without one (needs sb3)."""
-    from relgym.experiments.dyna_demo import demonstrate
+    from relgym.experiments.dyna.demo import demonstrate
 
     out.mkdir(parents=True, exist_ok=True)
     with _progress() as bar:
@@ -370,7 +370,7 @@ def plan(
     as_json: Json = False,
 ) -> None:
     """Let an agent explore a truck's world, print the laws and the task it found, and plan some episodes."""
-    from relgym.experiments.plan_demo import demonstrate
+    from relgym.experiments.plan.demo import demonstrate
 
     out.mkdir(parents=True, exist_ok=True)
     with _working("exploring and learning"):
@@ -383,14 +383,16 @@ def plan(
 )
 def benchmark(
     rest: typer.Context,
-    name: Annotated[str, typer.Argument(help="plan: real steps to success by planning in what was learned.")],
+    name: Annotated[str, typer.Argument(help="laws, plan, ...; without one, all are listed.")] = "",
 ) -> None:
-    """Run a benchmark, or go on with one, and report it beside its limits (`relgym benchmark plan --help`)."""
-    from relgym.experiments.plan_benchmark import main
+    """Run benchmarks, or go on with them, and tell them beside their limits (`relgym benchmark plan --help`)."""
+    from relgym.experiments.benchmark import main
+    from relgym.experiments.suites import listing, suite
 
-    if name != "plan":
-        raise ConfigError(f"benchmark {name!r}: expected plan")
-    main(rest.args)
+    if not name:
+        typer.echo(_columns(listing()))
+        return
+    main(suite(name), rest.args)
 
 
 @app.command()

@@ -68,8 +68,8 @@ ALLOWED_IN = {
         "relgym/logic/",  # candidates are scored a block of arrays at a time
         "tests/logic/",
         "relgym/baselines/interaction.py",  # blocks of a matrix
-        "relgym/experiments/law_",  # blocks stand in the rooms of other worlds
-        "tests/experiments/test_law_worlds.py",
+        "relgym/experiments/laws/",  # blocks stand in the rooms of other worlds
+        "tests/experiments/laws/test_worlds.py",
         "tests/fuzz/make_corpus.py",
         "tests/laws/",
         "tests/wrappers/dyna/test_stock.py",

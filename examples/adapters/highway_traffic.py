@@ -36,7 +36,7 @@ class Args:
     features: str = "products"
     """what to switch on beside properties, as the default configuration advises; nothing: the default"""
     record: str = ""
-    """a folder: only write what happens to files there, for `python -m relgym.experiments.any_env_tables`"""
+    """a folder: only write what happens to files there, for `relgym benchmark any-env --recordings`"""
 
 
 def highway() -> gym.Env[Any, Any]:

@@ -37,7 +37,7 @@ class Args:
     seed: int = 0
     """seed of episodes and actions; games to test on begin 10,000 later"""
     record: str = ""
-    """a folder: only write what happens to files there, for `python -m relgym.experiments.any_env_tables`"""
+    """a folder: only write what happens to files there, for `relgym benchmark any-env --recordings`"""
 
 
 class PongTable(gym.Env[Any, Any]):

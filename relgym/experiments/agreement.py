@@ -1,15 +1,14 @@
 """Whether a model says the same whoever runs it: arrays, the compiled kernel, and the Python it is exported as.
 
-``python -m relgym.experiments.agreement`` learns models, asks each of 100,000 scenes and prints a line for each:
-shares of equal outcomes, largest differences of values, and whether a scene alone gets the bits that it gets among
-others. Scenes are those of fresh runs, a third as they are, a third shaken a little and a third a lot.
+`relgym benchmark agreement` learns models, asks each of 100,000 scenes and tells shares of equal outcomes, largest
+differences of values, and whether a scene alone gets the bits that it gets among others. Scenes are those of fresh
+runs, a third as they are, a third shaken a little and a third a lot.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -18,18 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import relgym  # noqa: F401 - registers the envs
-from relgym.experiments.law_trials import TRIALS, Trial, trial_rooms
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
+from relgym.experiments.criterion import measured
+from relgym.experiments.laws.trials import TRIALS, Trial, trial_rooms
 from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.prediction import BatchPrediction
 from relgym.model.querying import predict_many
+from relgym.model.reports.text import Cell, table
 from relgym.model.running import Runner
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float2D, SceneLayout
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.follower import scenes_of
 
-__all__ = ["MODELS", "Agreement", "agreement", "main"]
+__all__ = ["MODELS", "SUITE", "Agreement", "agreement", "trial"]
 
 _SHAKEN: Final = (0.0, 1e-3, 0.3)
 """By how much scenes are changed, as a share of how much each number varies."""
@@ -72,14 +74,6 @@ class Agreement:
     exported_outcomes: float
     exported_largest: float
     refused: str = ""
-
-    def __str__(self) -> str:
-        if self.refused:
-            return f"left to arrays: {self.refused}"
-        return (
-            f"{self.scenes:>8,} {100 * self.outcomes:>9.5g} {self.largest:>9.1e} {'yes' if self.alone else 'no':>6} "
-            f"{self.exported:>8,} {100 * self.exported_outcomes:>9.5g} {self.exported_largest:>9.1e}"
-        )
 
 
 def _of_env(env_id: str, steps: int, arguments: dict[str, Any], options: dict[str, Any]) -> Taught:
@@ -192,23 +186,54 @@ def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     return float((np.abs(a - b) / np.maximum(np.abs(b), 1.0)).max(initial=0.0))
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print a line for each model."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("models", nargs="*", default=list(MODELS), metavar="MODEL", help=", ".join(MODELS))
-    parser.add_argument("--scenes", type=int, default=100_000, help="asked of arrays and of the kernel")
-    parser.add_argument("--exported", type=int, default=24_000, help="asked of the exported Python, too")
-    given = parser.parse_args(arguments)
-    heads = ("scenes", "same, %", "apart", "alone", "exported", "same, %", "apart")
-    print(
-        f"{'model':<28} " + " ".join(f"{h:>{w}}" for h, w in zip(heads, (8, 9, 9, 6, 8, 9, 9), strict=True))
-    )
-    for name in given.models:
-        if name not in MODELS:
-            parser.error(f"there is no model {name!r}: {', '.join(MODELS)}")
-        found = agreement(MODELS[name](), scenes=given.scenes, exported=min(given.exported, given.scenes))
-        print(f"{name:<28} {found}", flush=True)
+def trial(*, model: str, scenes: int, exported: int) -> dict[str, Any]:
+    """`agreement` of one of `MODELS`, as a task for the store of results."""
+    return asdict(agreement(MODELS[model](), scenes=scenes, exported=exported))
 
 
-if __name__ == "__main__":
-    main()
+def _models(extent: Extent, known: Known) -> Shown:
+    size = {"scenes": extent["scenes"], "exported": min(extent["exported"], extent["scenes"])}
+    asked = [{"model": name, **size} for name in extent["models"] or MODELS]
+    pairs = known.pairs("relgym.experiments.agreement:trial", asked)
+    told = [found for _, found in pairs if not found["refused"]]
+    measures = [
+        measured("same outcomes, kernel, %", 100.0, [100.0 * one["outcomes"] for one in told], ">="),
+        measured("values apart, kernel", 1e-12, [one["largest"] for one in told]),
+        measured("asked alone, the same bits", 1, [one["alone"] for one in told], ">="),
+        measured(
+            "same outcomes, exported Python, %",
+            100.0,
+            [100.0 * one["exported_outcomes"] for one in told],
+            ">=",
+        ),
+        measured("values apart, exported Python", 1e-12, [one["exported_largest"] for one in told]),
+    ]
+    rows: list[list[Cell]] = []
+    for arguments, one in pairs:
+        if one["refused"]:
+            rows.append([arguments["model"], f"left to arrays: {one['refused']}", *[""] * 6])
+            continue
+        kernel, exported = (
+            [f"{one['scenes']:,}", f"{100 * one['outcomes']:.5g}", f"{one['largest']:.1e}"],
+            [
+                f"{one['exported']:,}",
+                f"{100 * one['exported_outcomes']:.5g}",
+                f"{one['exported_largest']:.1e}",
+            ],
+        )
+        rows.append([arguments["model"], *kernel, "yes" if one["alone"] else "no", *exported])
+    heads = ["model", "scenes", "same, %", "apart", "alone", "exported", "same, %", "apart"]
+    return Shown(measures if told else (), [table(heads, rows)])
+
+
+SUITE: Final = Suite(
+    "agreement",
+    "Whether arrays, kernel and exported Python say the same",
+    {"models": Benchmark("Models in all ways to run them", _models)},
+    seeds=1,
+    options={
+        "models": Option((), f"of {', '.join(MODELS)}", tuple(MODELS)),
+        "scenes": Option(100_000, "asked of arrays and of the kernel"),
+        "exported": Option(24_000, "asked of the exported Python, too"),
+    },
+)

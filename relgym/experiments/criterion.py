@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentTypeError
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any, Literal
@@ -70,9 +70,18 @@ class Measure:
         return self.criterion.met(self.worst)
 
     def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        derived = {"worst": self.worst, "median": self.middle, "ok": self.ok}
-        return asdict(self.criterion) | {"values": list(self.values)} | derived
+        """Plain data; what is no finite number is told in words, as JSON has none."""
+        derived = {"worst": _plain(self.worst), "median": _plain(self.middle), "ok": self.ok}
+        return asdict(self.criterion) | {"values": list(map(_plain, self.values))} | derived
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Measure:
+        """Read what `to_json` wrote."""
+        return cls(Criterion(data["what"], data["limit"], data["side"]), tuple(map(float, data["values"])))
+
+
+def _plain(value: float) -> float | str:
+    return value if math.isfinite(value) else str(value)
 
 
 def measured(what: str, limit: float, values: Iterable[float], side: Literal["<=", ">="] = "<=") -> Measure:

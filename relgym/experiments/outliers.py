@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -11,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import relgym  # noqa: F401 - registers the envs
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
+from relgym.experiments.criterion import measured
+from relgym.experiments.seeds import TRAINING_SEEDS
+from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 from relgym.wrappers import ModelLearner
 
-__all__ = ["ENVS", "Corrupted", "errors_on", "learned"]
+__all__ = ["ENVS", "SUITE", "Corrupted", "errors_on", "learned", "trial"]
 
 ENVS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {"incline": 30, "elasticity": 0.9, "friction": 0.0}),
@@ -113,33 +116,65 @@ def _count(model: WorldModel, before: Scene, after: Scene, found: dict[str, list
             found.setdefault(str(target), []).append(float(off))
 
 
-def main() -> None:
-    """Learn each world twice and print, per target, both errors and their ratio."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("worlds", nargs="*", default=list(ENVS), help=f"of {', '.join(ENVS)}")
-    parser.add_argument("--steps", type=int, default=4_000)
-    parser.add_argument("--test", type=int, default=2_000)
-    parser.add_argument("--share", type=float, default=1 / 500)
-    parser.add_argument("--seed", type=int, default=0)
-    given = parser.parse_args()
-    for name in given.worlds:
-        clean = learned(name, given.steps, given.seed)
-        dirty = learned(name, given.steps, given.seed, share=given.share)
-        one, other = (errors_on(env.model, name, given.test, given.seed + 1000) for env in (clean, dirty))
-        corrupted = dirty.get_wrapper_attr("replaced")
-        print(
-            f"{name}: {given.steps:,} steps, {corrupted} numbers replaced, {dirty.skipped} observations skipped"
+def trial(*, world: str, steps: int, tests: int, every: int, seed: int) -> dict[str, Any]:
+    """A world learned clean, and with one number of so many replaced: errors of both, target by target."""
+    clean, dirty = learned(world, steps, seed), learned(world, steps, seed, share=1.0 / every)
+    one, other = (errors_on(env.model, world, tests, seed + 1_000) for env in (clean, dirty))
+    targets = {}
+    for target in sorted(one.keys() | other.keys()):
+        both = one.get(target, np.full(1, np.inf)), other.get(target, np.full(1, np.inf))
+        rms = [float(np.sqrt(np.mean(np.square(e)))) for e in both]
+        targets[target] = {
+            "wrong": [100.0 * float(np.mean(~(e <= 1e-6))) for e in both],
+            "rms": [size if np.isfinite(size) else None for size in rms],
+        }
+    return {
+        "replaced": int(dirty.get_wrapper_attr("replaced")),
+        "skipped": dirty.skipped,
+        "targets": targets,
+    }
+
+
+def _benchmark(world: str) -> Benchmark:
+    def measure(extent: Extent, known: Known) -> Shown:
+        size = {name: extent[name] for name in ("steps", "tests", "every")}
+        asked = [{"world": world, "seed": seed, **size} for seed in extent.first(TRAINING_SEEDS)]
+        found = known.pairs("relgym.experiments.outliers:trial", asked)
+        worse = [one["wrong"][1] - one["wrong"][0] for _, each in found for one in each["targets"].values()]
+        rows: list[list[Cell]] = [
+            [arguments["seed"], target, *(f"{share:.3f}" for share in one["wrong"]), *map(_size, one["rms"])]
+            for arguments, each in found
+            for target, one in each["targets"].items()
+        ]
+        heads = ["seed", "target", "clean: wrong, %", "with outliers", "clean: rms", "with outliers"]
+        notes = [table(heads, rows)]
+        notes += [
+            f"seed {a['seed']}: {one['replaced']} numbers replaced, {one['skipped']} observations skipped"
+            for a, one in found
+        ]
+        return Shown(
+            [measured("more wrong than without, % of predictions", _MORE, worse)] if found else (), notes
         )
-        for target in sorted(one.keys() | other.keys()):
-            a, b = one.get(target, np.full(1, np.inf)), other.get(target, np.full(1, np.inf))
-            rms = [float(np.sqrt(np.mean(np.square(e)))) for e in (a, b)]
-            wrong = [float(np.mean(~(e <= 1e-6))) for e in (a, b)]
-            print(
-                f"  {target:24} wrong {wrong[0]:8.3%} → {wrong[1]:8.3%}   rms {rms[0]:.3g} → {rms[1]:.3g}"
-                f"   ratio {rms[1] / max(rms[0], 1e-12):.3g}",
-                flush=True,
-            )
+
+    return Benchmark(f"{world}: one number in {_EVERY} replaced", measure)
 
 
-if __name__ == "__main__":
-    main()
+def _size(rms: float | None) -> str:
+    return "-" if rms is None else f"{rms:.3g}"
+
+
+_EVERY: Final = 500
+_MORE: Final = 0.5
+"""Per cent of predictions that may be wrong, or not made, because of them."""
+
+SUITE: Final = Suite(
+    "outliers",
+    "What outliers cost",
+    {world: _benchmark(world) for world in ENVS},
+    seeds=1,
+    options={
+        "steps": Option(4_000, "to learn from"),
+        "tests": Option(2_000, "clean fresh ones"),
+        "every": Option(_EVERY, "one number in so many is replaced"),
+    },
+)

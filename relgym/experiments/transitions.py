@@ -1,7 +1,7 @@
 """How many transitions it takes until predictions are right, and until they are right again after a law has changed.
 
-``python -m relgym.experiments.transitions --seeds 0 1 2`` prints a line for each world and seed. In a world that
-changes, gravity is halved or friction doubled after the given steps, which nothing tells the learner:
+`relgym benchmark transitions` tells a line for each world and seed. In a world that changes, gravity is halved or
+friction doubled after the given steps, which nothing tells the learner:
 
 - *right after*: steps until `RIGHT` of `WINDOW` predictions in a row, of all properties, were claimed and right;
 - *again after*: the same from the change on;
@@ -12,10 +12,9 @@ changes, gravity is halved or friction doubled after the given steps, which noth
 
 from __future__ import annotations
 
-import argparse
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any, Final
 
@@ -24,10 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import relgym  # noqa: F401 - registers the envs
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Shown, Suite
+from relgym.experiments.criterion import measured
+from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.model.prequential import StepReport
+from relgym.model.reports.text import Cell, table
 from relgym.wrappers import ModelLearner
 
-__all__ = ["WORLDS", "Course", "World", "course", "falling", "main", "sliding"]
+__all__ = ["SUITE", "WORLDS", "Course", "World", "course", "falling", "sliding", "trial"]
 
 WINDOW, RIGHT = 100, 99
 """So many of so many steps in a row are right once a law is known: one slip is no relapse."""
@@ -97,10 +100,10 @@ WORLDS: Final[Mapping[str, World]] = {
     "truck": World(_named("relgym/TruckPush-v0"), 800),
     "mountain-car": World(_named("MountainCar-v0"), 2_000),
     "pendulum": World(_named("Pendulum-v1"), 2_000),
-    "falling, gravity halved": World(falling, 600, {"gravity": 0.5}),
-    "sliding, friction doubled": World(sliding, 600, {"friction": 0.1}),
-    "truck, gravity halved": World(_named("relgym/TruckPush-v0"), 800, {"gravity": 4.9}),
-    "ball, friction doubled": World(_named("relgym/BallBoxRamp-v0", friction=0.1), 1_500, {"friction": 0.2}),
+    "falling-gravity-halved": World(falling, 600, {"gravity": 0.5}),
+    "sliding-friction-doubled": World(sliding, 600, {"friction": 0.1}),
+    "truck-gravity-halved": World(_named("relgym/TruckPush-v0"), 800, {"gravity": 4.9}),
+    "ball-friction-doubled": World(_named("relgym/BallBoxRamp-v0", friction=0.1), 1_500, {"friction": 0.2}),
 }
 """Worlds by name."""
 
@@ -116,7 +119,7 @@ class Course:
     slips
         Predictions between the change and being right again that were claimed and off.
     off
-        Share of all predictions after the change that were; NaN: no change.
+        Share of all predictions after the change that were; None: no change.
     late
         Share of the last steps that were right in all properties.
     """
@@ -124,7 +127,7 @@ class Course:
     first: int | None
     again: int | None
     slips: int
-    off: float
+    off: float | None
     late: float
 
 
@@ -134,7 +137,7 @@ def course(world: World, seed: int) -> Course:
     before = list(islice(_reports(learner, seed), world.steps))
     first = _until(before)
     if world.changed is None:
-        return Course(first, None, 0, float("nan"), float(np.mean([not r.wrong for r in before[-WINDOW:]])))
+        return Course(first, None, 0, None, float(np.mean([not r.wrong for r in before[-WINDOW:]])))
     other = ModelLearner(world.make(**world.changed), model=learner.get_wrapper_attr("model"))
     after = list(islice(_reports(other, seed + 1_000), world.steps))
     again = _until(after)
@@ -189,28 +192,59 @@ def _off(every: Sequence[StepReport]) -> NDArray[np.int64]:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print a line for each world and seed."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0] if __doc__ else None)
-    parser.add_argument("worlds", nargs="*", metavar="WORLD", help=", ".join(WORLDS))
-    parser.add_argument("--seeds", nargs="+", type=int, default=[0, 1, 2])
-    given = parser.parse_args(arguments)
-    print(
-        f"{'world':<28} {'seed':>4} {'right after':>12} {'again after':>12} {'claimed, off':>16} {'late':>7}"
-    )
-    for name in given.worlds or WORLDS:
-        if name not in WORLDS:
-            parser.error(f"there is no world {name!r}: {', '.join(WORLDS)}")
-        for seed in given.seeds:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # other people's envs warn when they are made
-                found = course(WORLDS[name], seed)
-            first, again = ("-" if n is None else n for n in (found.first, found.again))
-            print(
-                f"{name:<28} {seed:>4} {first:>12} {again:>12} {found.slips:>7} {found.off:>8.2%} {found.late:>7.1%}",
-                flush=True,
-            )
+def trial(*, world: str, seed: int) -> dict[str, Any]:
+    """`course` in one of `WORLDS`, as a task for the store of results."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # other people's envs warn when they are made
+        return asdict(course(WORLDS[world], seed))
 
 
-if __name__ == "__main__":
-    main()
+SEEDS: Final = tuple(range(40))
+"""On the first five of them a truck's laws were tuned; on those from 20 on nothing was."""
+
+_LIMITS: Final[Mapping[str, int]] = {"truck": 200}
+"""Steps after which predictions are to be right."""
+
+_OFF: Final = 1.0
+"""Per cent of the predictions after a change that may be claimed and off."""
+
+_TIMES: Final = 2.0
+"""Times as many steps as at first it may take until predictions are right again."""
+
+
+def _benchmark(name: str) -> Benchmark:
+    def measure(extent: Extent, known: Known) -> Shown:
+        asked = [{"world": name, "seed": seed} for seed in extent.first(SEEDS)]
+        pairs = known.pairs("relgym.experiments.transitions:trial", asked)
+        found, never = [each for _, each in pairs], WORLDS[name].steps
+        first, again = ([never if one[k] is None else one[k] for one in found] for k in ("first", "again"))
+        measures = []
+        if found and name in _LIMITS:
+            measures.append(measured("steps until predictions are right", _LIMITS[name], first))
+        if found and WORLDS[name].changed is not None:
+            ratios = [late / max(early, 1) for late, early in zip(again, first, strict=True)]
+            measures.append(measured("steps until right again, over those at first", _TIMES, ratios))
+            off = [100.0 * one["off"] for one in found]
+            measures.append(measured("claimed and off after the change, %", _OFF, off))
+        rows: list[list[Cell]] = [
+            [
+                arguments["seed"],
+                *("-" if n is None else n for n in (one["first"], one["again"])),
+                one["slips"],
+                f"{100.0 * one['late']:.1f}",
+            ]
+            for arguments, one in pairs
+        ]
+        return Shown(
+            measures, [table(["seed", "right after", "again after", "claimed, off", "late, %"], rows)]
+        )
+
+    return Benchmark(name, measure)
+
+
+SUITE: Final = Suite(
+    "transitions",
+    "How many transitions it takes",
+    {name: _benchmark(name) for name in WORLDS},
+    seeds=len(TRAINING_SEEDS),
+)

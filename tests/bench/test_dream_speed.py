@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from relgym.experiments.dyna_speed import WORLDS, dreams, engine
+from relgym.experiments.dyna.speed import WORLDS, dreams, engine
 
 
 @pytest.mark.parametrize("world", WORLDS)

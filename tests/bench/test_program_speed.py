@@ -9,7 +9,7 @@ import sys
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from relgym.experiments.dyna_speed import WORLDS, dreams
+from relgym.experiments.dyna.speed import WORLDS, dreams
 from relgym.model.compiled import KERNEL
 from relgym.model.lowering import lowered
 from relgym.model.world_model import WorldModel

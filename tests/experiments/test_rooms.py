@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
-from relgym.experiments.law_score import score, taught
+from relgym.experiments.laws.score import score, taught
 from relgym.experiments.rooms import Room, room_schema, rooms
 
 

@@ -29,8 +29,8 @@ from worlds import line, schema_of, transitions  # noqa: E402
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig  # noqa: E402
 from relgym.envs import AgentsEnv  # noqa: E402
 from relgym.envs.views import AgentsView, NumbersView, Static, TableView  # noqa: E402
-from relgym.experiments.law_motion import episode  # noqa: E402
-from relgym.experiments.law_worlds import Ball, Material, World  # noqa: E402
+from relgym.experiments.laws.motion import episode  # noqa: E402
+from relgym.experiments.laws.worlds import Ball, Material, World  # noqa: E402
 from relgym.files.reading import write_arrays  # noqa: E402
 from relgym.model.world_model import WorldModel  # noqa: E402
 from relgym.scene.objects import ACTION, Scene, Transition  # noqa: E402

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from law_streams import Stream, errors, formulas, moved, taught
 
-from relgym.experiments.law_trials import INEXPRESSIBLE, TRIALS, Trial, trial_rooms
-from relgym.experiments.law_worlds import Ball, Material, World
+from relgym.experiments.laws.trials import INEXPRESSIBLE, TRIALS, Trial, trial_rooms
+from relgym.experiments.laws.worlds import Ball, Material, World
 from relgym.laws.book import LawBook
 from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows

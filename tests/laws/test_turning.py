@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.experiments.body_trials import learned, rolled, tally
-from relgym.experiments.body_worlds import Setting, body_rooms
+from relgym.experiments.bodies.trials import learned, rolled, tally
+from relgym.experiments.bodies.worlds import Setting, body_rooms
 from relgym.laws.account import accounts
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources

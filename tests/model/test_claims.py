@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from points import schema_of
 
-from relgym.experiments.law_trials import trial_rooms
-from relgym.experiments.law_worlds import Ball, Material, World
-from relgym.experiments.strangers import measure
+from relgym.experiments.laws.trials import trial_rooms
+from relgym.experiments.laws.worlds import Ball, Material, World
+from relgym.experiments.strangers.suite import measure
 from relgym.model.fitting import compare_and_learn
 from relgym.model.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel

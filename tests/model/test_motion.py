@@ -11,12 +11,12 @@ from relgym.config import ModelConfig
 from relgym.envs.ball_box_ramp import BallBoxRampEnv
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import ConfigError
-from relgym.experiments.body_worlds import Setting, body_rooms
+from relgym.experiments.bodies.worlds import Setting, body_rooms
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
-from relgym.experiments.law_score import taught
-from relgym.experiments.law_trials import trial_rooms
-from relgym.experiments.law_worlds import Ball, Material, World
+from relgym.experiments.laws.score import taught
+from relgym.experiments.laws.trials import trial_rooms
+from relgym.experiments.laws.worlds import Ball, Material, World
 from relgym.experiments.rollouts import largest_errors
 from relgym.model.motion import FREE, TOUCHING
 from relgym.model.prediction import Outcome

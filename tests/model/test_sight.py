@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from programs import MODELS, crowded, room_schema, scenes_of
 
 from relgym.errors import ShapeError
-from relgym.experiments.law_trials import TRIALS, Trial, trial_rooms
+from relgym.experiments.laws.trials import TRIALS, Trial, trial_rooms
 from relgym.model import perception
 from relgym.model.compiled import KERNEL, Kernel
 from relgym.model.perception import Percept, Perception

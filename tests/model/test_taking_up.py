@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ObservationError
-from relgym.experiments.body_worlds import Setting, body_rooms
+from relgym.experiments.bodies.worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.fitting import compare_and_learn
 from relgym.model.grounds import Grounds

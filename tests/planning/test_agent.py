@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.errors import ConfigError
-from relgym.experiments.pit import Pit, falls
+from relgym.experiments.plan.pit import Pit, falls
 from relgym.planning import PlanningAgent, TreeSearch
 from relgym.planning import agent as planning_agent
 

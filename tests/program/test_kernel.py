@@ -22,7 +22,7 @@ from programs import (
     with_laws,
 )
 
-from relgym.experiments.law_trials import TRIALS
+from relgym.experiments.laws.trials import TRIALS
 from relgym.laws.learner import LawLearner
 from relgym.model.lowering import lowered
 from relgym.model.trusting import trusting

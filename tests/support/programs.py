@@ -18,7 +18,7 @@ from relgym.classification.views import Scope as Offered
 from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.envs.dreams.setting import recorded
-from relgym.experiments.law_trials import Trial, trial_rooms
+from relgym.experiments.laws.trials import Trial, trial_rooms
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import FRAMES, POINT, axis_names

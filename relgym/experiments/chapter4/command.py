@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from relgym.experiments.benchmark import Made
 from relgym.experiments.chapter4.catalogue import JOBS, chosen
 from relgym.experiments.chapter4.job import Job
 from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.reproduce import Made, compute, make
+from relgym.experiments.chapter4.reproduce import compute, make
 from relgym.experiments.jobs.run import Progress
 from relgym.experiments.jobs.store import ResultStore
 

@@ -10,7 +10,7 @@ import numpy as np
 from relgym.config import ModelConfig
 from relgym.experiments.chapter4.learners import modes_of, settings_of, taught
 from relgym.experiments.chapter4.lesson import fresh_episodes, taught_episodes
-from relgym.experiments.noise import corrupted, shortfall
+from relgym.experiments.worlds.noise import corrupted, shortfall
 from relgym.thesis.settings import ThesisSettings
 
 __all__ = ["lesson"]

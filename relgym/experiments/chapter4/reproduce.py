@@ -7,12 +7,13 @@ import io
 import json
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import date
 from pathlib import Path
 from typing import Any, Final
 
 from relgym.errors import StoreError
+from relgym.experiments.benchmark import Made, section, sections_of
 from relgym.experiments.chapter4.canvas import TITLES
 from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
@@ -23,7 +24,7 @@ from relgym.experiments.jobs.run import Progress, results, run
 from relgym.experiments.jobs.store import ResultStore, write_atomically
 from relgym.experiments.jobs.task import Task
 
-__all__ = ["Made", "compute", "make", "page", "section"]
+__all__ = ["compute", "make", "page"]
 
 PAGES: Final = {
     "dream.md": "What dreaming is worth",
@@ -32,40 +33,6 @@ PAGES: Final = {
     "any-env.md": "Other people's envs",
 }
 """Pages of results beside this one, and their titles."""
-
-
-@dataclass(frozen=True, slots=True)
-class Made:
-    """A job's output on disk.
-
-    Attributes
-    ----------
-    name, title, source
-        Of the job.
-    text
-        The table, beside the thesis' numbers.
-    figure
-        File name of the figure; empty if it is a table.
-    day, command
-        When and how it was made.
-    seconds
-        Of computing, all tasks together.
-    code
-        Digest of the code behind it (`relgym.experiments.chapter4.staleness`).
-    protocol
-        How thoroughly, for people.
-    """
-
-    name: str
-    title: str
-    source: str
-    text: str
-    figure: str
-    day: str
-    command: str
-    seconds: float
-    code: str = ""
-    protocol: str = ""
 
 
 def compute(
@@ -172,19 +139,11 @@ def page(out: Path, target: Path) -> list[str]:
             write_atomically(folder / each.figure, (out / each.figure).read_bytes())
         else:  # one of an earlier run shows what is no longer so
             (folder / f"{each.name}.png").unlink(missing_ok=True)
-    known = _kept(target) | {each.name: section(each, folder.name) for each in made}
+    known = sections_of(target) | {each.name: section(each, folder.name) for each in made}
     sections = [known[name] for name in JOBS if name in known]
     text = "\n\n".join([_head(sections, folder), *sections, ""])
     write_atomically(target, declared(text, outdated(text)).encode())
     return [each.name for each in made]
-
-
-def _kept(target: Path) -> dict[str, str]:
-    """Sections of a page as it is, by job."""
-    if not target.is_file():
-        return {}
-    parts = target.read_text(encoding="utf-8").split("\n## ")[1:]
-    return {part.partition(":")[0]: f"## {part.rstrip()}" for part in parts}
 
 
 def _made(out: Path) -> Iterator[Made]:
@@ -222,12 +181,3 @@ def _head(sections: Sequence[str], folder: Path) -> str:
 
 def _anchor(title: str) -> str:
     return "".join(c for c in title.lower().replace(" ", "-") if c.isalnum() or c in "-_")
-
-
-def section(made: Made, folder: str) -> str:
-    """A part of a page of results: its heading, how it was made, its figure in `folder`, its text."""
-    figure = f"\n\n![{made.title}]({folder}/{made.figure})" if made.figure else ""
-    code = f"; code `{made.code}`" if made.code else ""
-    protocol = f"; {made.protocol}" if made.protocol else ""
-    how = f"`{made.command}`, {made.day}{code}{protocol}; {made.seconds:.0f} s of computing."
-    return f"## {made.name}: {made.title} ({made.source})\n\n{how}{figure}\n\n```text\n{made.text}\n```"

@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 
 from relgym.cli import app
 from relgym.errors import ConfigError, StoreError
+from relgym.experiments.benchmark import Made
 from relgym.experiments.chapter4.catalogue import JOBS, chosen
 from relgym.experiments.chapter4.command import Request, remaining, reproduce
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import REMARKS
-from relgym.experiments.chapter4.reproduce import Made, compute, make, page
+from relgym.experiments.chapter4.reproduce import compute, make, page
 from relgym.experiments.jobs.code import code_version, modules_behind
 from relgym.experiments.jobs.run import Progress
 from relgym.experiments.jobs.store import ResultStore

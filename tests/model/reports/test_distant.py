@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.experiments.bodies import FORCES
-from relgym.experiments.body_trials import watched
-from relgym.experiments.body_worlds import body_rooms
+from relgym.experiments.bodies.suite import FORCES
+from relgym.experiments.bodies.trials import watched
+from relgym.experiments.bodies.worlds import body_rooms
 from relgym.model.reports import distant
 from relgym.model.reports.advice import Advice
 from relgym.model.reports.distant import DistantForce, distant_forces

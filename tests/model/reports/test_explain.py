@@ -12,7 +12,7 @@ from rule_checker import Checker, printed
 from relgym.config import ModelConfig
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
-from relgym.experiments.online import learned
+from relgym.experiments.worlds.online import learned
 from relgym.model.reports.explain import Explanation, explanations
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene

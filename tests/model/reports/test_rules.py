@@ -22,7 +22,7 @@ from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
-from relgym.experiments.online import learned
+from relgym.experiments.worlds.online import learned
 from relgym.model.reports.rules import agreement, rule_list
 from relgym.model.target.limits import Limits
 from relgym.model.target.scope import Scope

@@ -1,0 +1,1 @@
+"""Bodies that push, turn and stack: worlds, trials, and parcels delivered."""

@@ -1,0 +1,1 @@
+"""What planning is worth: courses of learning by planning in what was learned."""

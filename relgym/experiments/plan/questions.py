@@ -1,0 +1,213 @@
+"""Questions about planning besides how soon it succeeds: exploration, changes, pits, and foreign envs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from statistics import median
+from typing import Any, Final, TypeAlias
+
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Shown
+from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.dyna.course import ENOUGH
+from relgym.experiments.jobs.task import Task
+from relgym.experiments.plan.course import COURSES
+from relgym.experiments.plan.foreign import FOREIGN
+from relgym.model.reports.text import Cell, table
+
+__all__ = ["QUESTIONS", "SEEDS"]
+
+SEEDS: Final = tuple(range(10))
+"""On which nothing was chosen; what was chosen was chosen on seeds from 100 on."""
+
+_PLAN: Final = "relgym.experiments.plan.course"
+
+_EXPLORATION: Final[Mapping[str, tuple[int, int]]] = {
+    "truck": (1_500, 25),
+    "ball": (60, 1),
+    "materials": (1_000, 1),
+}
+"""Real decisions in which agents get to know a world, and from one test of what they know to the next."""
+
+_MORE: Final = 2.0
+"""How many times as many decisions random play is to take, and in what share of the seeds."""
+
+_MOSTLY: Final = 90
+
+_CHANGED: Final = 400
+"""Real steps after the world has changed."""
+
+_BACK: Final = 300
+"""Real steps after which success is to be back, and successes of 100 that SAC may be ahead by at any test."""
+
+_AHEAD: Final = 10
+
+_FALLS: Final = 1
+"""Falls in 100 episodes that a careful agent may have."""
+
+_SOLVED: Final = 95
+"""Successes of 100 that count as solved where a model was learned from random steps."""
+
+
+_Found: TypeAlias = Sequence[tuple[Task, Any]]
+
+
+def _question(
+    title: str, tasks: Callable[[Sequence[int], int], list[Task]], told: Callable[[_Found], Shown]
+) -> Benchmark:
+    """Of seeds and episodes of a test follows what has to be run, and of that what is told."""
+
+    def measure(extent: Extent, known: Known) -> Shown:
+        return told(known.of(tasks(extent.first(SEEDS), extent["episodes"])))
+
+    return Benchmark(title, measure)
+
+
+def _exploration_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
+    return [
+        Task(
+            f"{_PLAN}:knowing",
+            {"course": course, "explores": explores, "seed": seed, "steps": steps, "every": every},
+            f"plan exploration {course}",
+        )
+        for seed in seeds
+        for course, (steps, every) in _EXPLORATION.items()
+        for explores in (True, False)
+    ]
+
+
+def _exploration_told(found: _Found) -> Shown:
+    known = {
+        (task.arguments["course"], task.arguments["seed"], task.arguments["explores"]): value["known_at"]
+        for task, value in found
+    }
+    measures: list[Measure] = []
+    rows: list[list[Cell]] = []
+    for course, (steps, every) in _EXPLORATION.items():
+        ratios = []
+        for seed in sorted({seed for name, seed, _ in known if name == course}):
+            if not {(course, seed, True), (course, seed, False)} <= known.keys():
+                continue
+            both = known[course, seed, True], known[course, seed, False]
+            own, other = (steps + every if at is None else at for at in both)
+            ratios.append(other / own)
+            told = [f"> {steps:,}" if at is None else f"{at:,}" for at in both]
+            rows.append([COURSES[course].title, str(seed), *told, f"{ratios[-1]:.1f}"])
+        if ratios:
+            title = COURSES[course].title
+            what = f"{title}: random play's decisions over exploration's until 99 % is right, median"
+            measures.append(measured(what, _MORE, [median(ratios)], ">="))
+            share = 100.0 * sum(ratio >= _MORE for ratio in ratios) / len(ratios)
+            measures.append(
+                measured(f"{title}: seeds in which it is twice as many, %", _MOSTLY, [share], ">=")
+            )
+    return Shown(measures, [table(["world", "seed", "explores", "at random", "ratio"], rows)])
+
+
+def _change_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
+    return [
+        Task(f"{_PLAN}:recovering", {"seed": seed, "steps": _CHANGED, "episodes": episodes}, "plan change")
+        for seed in seeds
+    ]
+
+
+def _change_told(found: _Found) -> Shown:
+    rows: list[list[Cell]] = []
+    back, ahead = [], []
+    for task, value in found:
+        curve, baseline = value["curve"], value["baseline"]
+        again = next((at for at, good in curve[1:] if good >= ENOUGH), None)
+        back.append(_CHANGED + 50 if again is None else again)
+        at_once = dict(map(tuple, curve))
+        ahead += [good - at_once[at] for at, good in baseline if at in at_once]
+        rows.append(
+            [
+                str(task.arguments["seed"]),
+                ", ".join(str(good) for _, good in curve),
+                "never" if again is None else str(again),
+                ", ".join(f"{good} after {at}" for at, good in baseline),
+            ]
+        )
+    measures = []
+    if back:
+        measures.append(measured("steps after the change until success is back", _BACK, back))
+        measures.append(measured("successes of 100 by which SAC was ahead at a test", _AHEAD, ahead))
+    heading = ["seed", "successes of 100 before, and every 50 steps after the change", "back after", "SAC"]
+    return Shown(measures, [table(heading, rows)])
+
+
+def _pit_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
+    return [
+        Task(
+            "relgym.experiments.plan.pit:falling",
+            {"seed": seed, "safe": safe, "episodes": episodes},
+            "plan pit",
+        )
+        for seed in seeds
+        for safe in (True, False)
+    ]
+
+
+def _pit_told(found: _Found) -> Shown:
+    def falls(*, safe: bool) -> list[float]:
+        return [
+            100.0 * value["falls"] / task.arguments["episodes"]
+            for task, value in found
+            if task.arguments["safe"] is safe
+        ]
+
+    measures = []
+    if careful := falls(safe=True):
+        measures.append(measured("falls in 100 episodes, safe", _FALLS, careful))
+    if bold := falls(safe=False):
+        measures.append(measured("falls in 100 episodes, not safe (it is a pit)", _FALLS + 1, bold, ">="))
+    return Shown(measures)
+
+
+def _foreign_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
+    return [
+        Task(
+            f"relgym.experiments.plan.foreign:{function}",
+            {"name": name, "seed": seed, "episodes": episodes},
+            f"plan {function} {name}",
+        )
+        for seed in seeds
+        for function in ("planned", "agent_alone")
+        for name in FOREIGN
+    ]
+
+
+def _foreign_told(found: _Found) -> Shown:
+    measures: list[Measure] = []
+    rows: list[list[Cell]] = []
+    for name, place in FOREIGN.items():
+        own, baseline = (
+            [value for task, value in found if task.name == function and task.arguments["name"] == name]
+            for function in ("planned", "agent_alone")
+        )
+        if own:
+            good = [value["successes"] for value in own]
+            measures.append(
+                measured(f"{place.title}: successes of 100 after 1,000 random steps", _SOLVED, good, ">=")
+            )
+            costs = [
+                f"{median(value['learning'] for value in own):.1f} s",
+                f"{1000 * median(value['decision'] for value in own):.1f} ms",
+            ]
+            rows.append([place.title, "planner, relgym", "1,000", ", ".join(map(str, good)), *costs])
+        if baseline:
+            at = [value["solved_at"] for value in baseline]
+            steps = ", ".join(f"> {place.limit:,}" if one is None else f"{one:,}" for one in at)
+            good = [value["curve"][-1][1] for value in baseline]
+            rows.append([place.title, place.baseline, steps, ", ".join(map(str, good)), "-", "-"])
+    return Shown(
+        measures, [table(["env", "agent", "real steps", "successes of 100", "learning", "decision"], rows)]
+    )
+
+
+QUESTIONS: Final[Mapping[str, Benchmark]] = {
+    "exploration": _question("Exploration against random play", _exploration_tasks, _exploration_told),
+    "change": _question("Half the gravity, and friction, after 1,000 steps", _change_tasks, _change_told),
+    "pit": _question("A pit that was never seen", _pit_tasks, _pit_told),
+    "foreign": _question("Pendulum and MountainCar", _foreign_tasks, _foreign_told),
+}
+"""By name."""

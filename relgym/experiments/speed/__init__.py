@@ -1,0 +1,1 @@
+"""Time and memory: steps of learning, sizes of worlds, roll-outs."""

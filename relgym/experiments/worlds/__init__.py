@@ -1,0 +1,1 @@
+"""The thesis' worlds: accuracy, cost, learning online, noise."""
