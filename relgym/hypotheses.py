@@ -7,7 +7,8 @@ tuned for years, teaches it to every model without touching the core:
 2. the core *scores* it in bits: the law is kept if it codes the examples, itself included, in fewer bits than that
    nothing changes, than least squares, and than the law kept before, by ten bits and those that tell which of
    the proposals it was;
-3. from then on it is one of the experts of `relgym.model.calibration`: before each step it says what comes next, and
+3. from then on it is one of the experts of `relgym.model.predicting.calibration`: before each step it says what comes
+next, and
    once it has coded what came in fewer bits than whoever spoke until then, it speaks. How often it was right is
    counted like anybody's, so its claims are calibrated.
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # what checkers and editors see; at run time `__getattr__` lo
         TableView,
         View,
     )
-    from relgym.model.prequential import Prequential, StepReport
+    from relgym.model.predicting.prequential import Prequential, StepReport
     from relgym.wrappers.action_repeat import ActionRepeat
     from relgym.wrappers.flat import FlatView, VectorFlatView
     from relgym.wrappers.model_learner import ModelLearner
@@ -40,11 +40,11 @@ _HOMES = {
     "ModelLearner": "relgym.wrappers.model_learner",
     "NumbersView": "relgym.envs.views",
     "Part": "relgym.envs.views",
-    "Prequential": "relgym.model.prequential",
+    "Prequential": "relgym.model.predicting.prequential",
     "Rows": "relgym.envs.views",
     "SceneView": "relgym.envs.views",
     "Static": "relgym.envs.views",
-    "StepReport": "relgym.model.prequential",
+    "StepReport": "relgym.model.predicting.prequential",
     "TableView": "relgym.envs.views",
     "VectorFlatView": "relgym.wrappers.flat",
     "VectorModelLearner": "relgym.wrappers.vector_model_learner",

@@ -23,7 +23,7 @@ from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count
 from relgym.errors import ConfigError, RelgymError
 from relgym.hypotheses import register_hypothesis, registered
-from relgym.model.prequential import Outcomes, Prequential, compared
+from relgym.model.predicting.prequential import Outcomes, Prequential, compared
 from relgym.model.protocol import SceneLearner
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition

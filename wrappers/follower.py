@@ -11,7 +11,7 @@ from gymnasium.error import ResetNeeded
 
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError, ShapeError
-from relgym.model.prediction import ScenePrediction
+from relgym.model.predicting.prediction import ScenePrediction
 from relgym.scene.objects import Scene, Transition
 from relgym.scene.sizes import check_sizes
 

@@ -10,8 +10,8 @@ from relgym.arguments import refusing
 from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, View
 from relgym.errors import ConfigError, ObservationError
-from relgym.model.prediction import ScenePrediction
-from relgym.model.prequential import Prequential
+from relgym.model.predicting.prediction import ScenePrediction
+from relgym.model.predicting.prequential import Prequential
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.observer import Observer
 

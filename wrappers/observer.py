@@ -16,8 +16,8 @@ from relgym.envs.model_files import EnvRecord
 from relgym.envs.views import Angle, NumbersView, TaskView, View
 from relgym.errors import ConfigError, ObservationError, RelgymError
 from relgym.model.files.storage import target_to_json
-from relgym.model.prediction import ScenePrediction
-from relgym.model.prequential import StepReport
+from relgym.model.predicting.prediction import ScenePrediction
+from relgym.model.predicting.prequential import StepReport
 from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations, Follower, Look

@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.model.files.storage import target_from_json
+from relgym.model.percepts.scenes import mismatch
 from relgym.model.protocol import SceneLearner
-from relgym.model.scenes import mismatch
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Target
 from relgym.scene.schema import SceneSchema

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 from relgym.errors import ConfigError
-from relgym.model.fitting import compare_and_learn
-from relgym.model.prediction import ScenePrediction
-from relgym.model.prequential import Outcomes, Prequential, StepReport
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.prediction import ScenePrediction
+from relgym.model.predicting.prequential import Outcomes, Prequential, StepReport
 from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers.background import Background

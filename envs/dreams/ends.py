@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, ScenePrediction
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome, ScenePrediction
 
 __all__ = ["CAUSES", "Cause", "causes", "explained", "horizon_reached", "parts_of", "parts_of_row"]
 

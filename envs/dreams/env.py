@@ -32,7 +32,7 @@ from relgym.envs.dreams.setting import Setting, check_knowledge
 from relgym.envs.dreams.starts import Start
 from relgym.envs.views import View
 from relgym.errors import ConfigError
-from relgym.model.prediction import ScenePrediction
+from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema

@@ -13,7 +13,7 @@ from relgym.envs.dreams.ends import CAUSES, Cause, causes, explained, horizon_re
 from relgym.envs.dreams.rewards import BatchStepEvaluator, TaskFunctions
 from relgym.envs.dreams.setting import Setting
 from relgym.envs.dreams.shown import Deeds
-from relgym.model.prediction import BatchPrediction
+from relgym.model.predicting.prediction import BatchPrediction
 from relgym.scene.objects import Float1D, Float2D, SceneLayout
 
 __all__ = ["DreamStep", "Stepped"]

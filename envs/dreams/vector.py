@@ -36,7 +36,7 @@ from relgym.envs.dreams.starts import BatchStart, Drawn
 from relgym.envs.dreams.step import DreamStep, Stepped
 from relgym.envs.views import View
 from relgym.errors import ConfigError, ObservationError
-from relgym.model.prediction import BatchPrediction
+from relgym.model.predicting.prediction import BatchPrediction
 from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Float1D, Float2D, Scene
 from relgym.scene.schema import SceneSchema

@@ -13,7 +13,7 @@ from relgym.envs.actions import without_action
 from relgym.envs.arguments import action_numbers
 from relgym.envs.views.records import identifiers
 from relgym.errors import ActionError, ConfigError
-from relgym.model.scenes import scene_of
+from relgym.model.percepts.scenes import scene_of
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene, SceneLayout
 
 __all__ = ["MOST_CHOICES", "Acts"]

@@ -18,7 +18,7 @@ from relgym.envs.views.base import precision_of
 from relgym.envs.views.leaves import Numbers
 from relgym.envs.views.records import Angle, Part, Static, identifiers
 from relgym.errors import ConfigError, ObservationError
-from relgym.model.scenes import scene_of
+from relgym.model.percepts.scenes import scene_of
 from relgym.scene.objects import Float1D, Float2D, Scene, SceneLayout
 
 __all__ = ["NumbersView"]

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from relgym.baselines.ensemble import MLPEnsemble
 from relgym.errors import ConfigError
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
-from relgym.model.scenes import unwrapped, wrap
+from relgym.model.percepts.scenes import unwrapped, wrap
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.scene.objects import ACTION, Float2D, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 

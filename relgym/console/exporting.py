@@ -12,7 +12,7 @@ import numpy as np
 from relgym.console.models import ModelInEnv
 from relgym.errors import ConfigError
 from relgym.files.writing import write_whole
-from relgym.model.prediction import BatchPrediction
+from relgym.model.predicting.prediction import BatchPrediction
 from relgym.scene.objects import Float2D, Scene
 from relgym.wrappers.follower import scenes_of
 

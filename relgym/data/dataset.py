@@ -18,7 +18,7 @@ from gymnasium import spaces
 from relgym.arguments import refusing_calls, whole
 from relgym.envs.arguments import checked_count, checked_function
 from relgym.errors import ConfigError, DataError
-from relgym.model.fitting import ends_of
+from relgym.model.learning.fitting import ends_of
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.views import metadata_of, readable, schema_of
 

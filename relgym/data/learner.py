@@ -14,9 +14,9 @@ from relgym.config.checks import checked_count
 from relgym.data.dataset import Dataset, Episode
 from relgym.envs.views import TaskView, View, view_from_json
 from relgym.errors import ConfigError, DataError, ObservationError
-from relgym.model.fitting import Progress
-from relgym.model.prequential import StepReport
-from relgym.model.score import Score, scored
+from relgym.model.learning.fitting import Progress
+from relgym.model.predicting.prequential import StepReport
+from relgym.model.predicting.score import Score, scored
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Transition
 from relgym.wrappers.follower import BadObservations, Follower

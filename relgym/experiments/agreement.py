@@ -20,12 +20,12 @@ import relgym  # noqa: F401 - registers the envs
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.criterion import measured
 from relgym.experiments.laws.trials import TRIALS, Trial, trial_rooms
-from relgym.model.compiled import KERNEL
-from relgym.model.lowering import lowered
-from relgym.model.prediction import BatchPrediction
-from relgym.model.querying import predict_many
+from relgym.model.predicting.prediction import BatchPrediction
+from relgym.model.predicting.querying import predict_many
 from relgym.model.reports.text import Cell, table
-from relgym.model.running import Runner
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.lowering import lowered
+from relgym.model.running.runner import Runner
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float2D, SceneLayout
 from relgym.wrappers import ModelLearner

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relgym.experiments.analytic import AnalyticModes, Case
 from relgym.experiments.episodes import Episode
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 

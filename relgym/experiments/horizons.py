@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relgym.experiments.fresh import FreshEpisode
 from relgym.experiments.rollouts import STRAY, outside
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.reports.text import Cell, amount, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, SceneLayout

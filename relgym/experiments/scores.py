@@ -10,7 +10,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.reports.text import Cell, table
 from relgym.model.target.hindsight import WRONG
 from relgym.model.world_model import WorldModel

@@ -19,7 +19,7 @@ import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.config import ModelConfig
-from relgym.model.forgetting import SLACK
+from relgym.model.learning.forgetting import SLACK
 from relgym.wrappers import ModelLearner
 
 __all__ = ["WORLDS", "fill_cache", "give_back", "main", "soak", "summary"]

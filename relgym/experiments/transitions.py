@@ -26,7 +26,7 @@ import relgym  # noqa: F401 - registers the envs
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Shown, Suite
 from relgym.experiments.criterion import measured
 from relgym.experiments.seeds import TRAINING_SEEDS
-from relgym.model.prequential import StepReport
+from relgym.model.predicting.prequential import StepReport
 from relgym.model.reports.text import Cell, table
 from relgym.wrappers import ModelLearner
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, chunks
 from relgym.experiments.rollouts import largest_errors
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
 
 __all__ = ["EXACT", "Missed", "Verdict", "verdict"]

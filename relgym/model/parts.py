@@ -14,12 +14,12 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
-from relgym.model.chaining import Inquiry, Look, in_order
-from relgym.model.motion import Laws, possible_targets
-from relgym.model.perception import Percept, Perception
-from relgym.model.regression import Regressed, Regression
-from relgym.model.scenes import MOST_LAYOUTS, TURN, mismatch, next_values, passage
-from relgym.model.screening import Screen
+from relgym.model.percepts.perception import Percept, Perception
+from relgym.model.percepts.scenes import MOST_LAYOUTS, TURN, mismatch, next_values, passage
+from relgym.model.percepts.screening import Screen
+from relgym.model.predicting.chaining import Inquiry, Look, in_order
+from relgym.model.predicting.motion import Laws, possible_targets
+from relgym.model.predicting.regression import Regressed, Regression
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK, TERMINATED, Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema

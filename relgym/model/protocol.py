@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from relgym.clustering.mode import Mode
-from relgym.model.learning import LearnReport
-from relgym.model.prediction import BatchPrediction, ScenePrediction
+from relgym.model.learning.transition import LearnReport
+from relgym.model.predicting.prediction import BatchPrediction, ScenePrediction
 from relgym.scene.objects import Float2D, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 

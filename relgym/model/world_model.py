@@ -23,13 +23,14 @@ from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryEr
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
 from relgym.laws.book import LawBook
-from relgym.model.compiled import KERNEL
 from relgym.model.files.archive import parts_from_json, parts_to_arrays, parts_to_json
 from relgym.model.files.storage import read_model, write_model
-from relgym.model.fitting import Progress, as_transitions, progressive, transitions_of
-from relgym.model.journal import Journal
-from relgym.model.learning import NOTHING, LearnReport, finish, learn
-from relgym.model.locality import (
+from relgym.model.learning.fitting import Progress, as_transitions, progressive, transitions_of
+from relgym.model.learning.journal import Journal
+from relgym.model.learning.merging import merge
+from relgym.model.learning.transition import NOTHING, LearnReport, finish, learn
+from relgym.model.parts import Parts
+from relgym.model.percepts.locality import (
     Neighbourhoods,
     check_size,
     foci,
@@ -38,18 +39,18 @@ from relgym.model.locality import (
     predict_locally,
     predict_many_locally,
 )
-from relgym.model.lowering import lowered
-from relgym.model.merging import merge
-from relgym.model.parts import Parts
-from relgym.model.perception import Percept, Situation
-from relgym.model.prediction import BatchPrediction, Outcome, ScenePrediction
-from relgym.model.querying import predict, predict_many
+from relgym.model.percepts.perception import Percept, Situation
+from relgym.model.percepts.scenes import next_values, with_action
+from relgym.model.predicting.prediction import BatchPrediction, Outcome, ScenePrediction
+from relgym.model.predicting.querying import predict, predict_many
+from relgym.model.predicting.score import Score, scored
 from relgym.model.reports.advice import Advice, advices, together
 from relgym.model.reports.rules import doubted, of_laws, rule_list
-from relgym.model.rolling import BatchRollout, step_by_step
-from relgym.model.running import PATIENCE, Programs, Runner
-from relgym.model.scenes import next_values, with_action
-from relgym.model.score import Score, scored
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.lowering import lowered
+from relgym.model.running.rolling import BatchRollout, step_by_step
+from relgym.model.running.runner import PATIENCE, Programs, Runner
+from relgym.model.running.trusting import trusting
 from relgym.model.target.hindsight import (
     Confirmed,
     Retrospect,
@@ -60,7 +61,6 @@ from relgym.model.target.hindsight import (
     restore_hindsight,
 )
 from relgym.model.target.property_model import PropertyModel
-from relgym.model.trusting import trusting
 from relgym.program.records import BeyondError
 from relgym.program.source import python_source
 from relgym.reporting.naming import named_text
@@ -252,10 +252,10 @@ class WorldModel:
         Notes
         -----
         Whatever else is raised, an interrupt from the keyboard included, the model is as it was before
-        (`relgym.model.journal`).
+        (`relgym.model.learning.journal`).
 
         A transition in which a number is far larger than all that is known of its property is set aside, and counted in
-        `set_aside`, not in `seen` (`relgym.model.screening`).
+        `set_aside`, not in `seen` (`relgym.model.percepts.screening`).
 
         Cost: relations once, then per target O(modes); searches and re-learning when an example is news.
         """

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from relgym.clustering.mode import Mode
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float1D, Float2D, SceneLayout
 

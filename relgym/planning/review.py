@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.model.prediction import BatchPrediction
+from relgym.model.predicting.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import SceneLayout, Transition
 

@@ -57,7 +57,7 @@ from relgym.program.tape import (
 __all__ = ["forget", "roll", "run", "see"]
 
 PREDICTED, NO_MODE, UNEXPLAINED, NO_ROLES, OUTSIDE, DEPENDS, UNSURE = range(7)
-"""Outcomes, in the order of `relgym.model.prediction.OUTCOMES`."""
+"""Outcomes, in the order of `relgym.model.predicting.prediction.OUTCOMES`."""
 
 lanes = range
 """A range whose rounds don't wait for each other: compiled, several are made at once."""
@@ -1613,7 +1613,7 @@ def guessed(s, a):
 
 
 def lead_of(margin):
-    """The bin of a lead (`relgym.model.calibration.key_of`)."""
+    """The bin of a lead (`relgym.model.predicting.calibration.key_of`)."""
     if not margin > 0.0:
         return 0
     if margin == math.inf:
@@ -1625,7 +1625,7 @@ def lead_of(margin):
 
 
 def far_bin(distance):
-    """The bin of how far a scene lies from what regressions know (`relgym.model.calibration.far_bin`)."""
+    """The bin of how far a scene lies from what regressions know (`relgym.model.predicting.calibration.far_bin`)."""
     if not distance >= 2.0:
         return 0
     found, most = 8, 4.0
@@ -1675,7 +1675,7 @@ def look_at(s, fit):
 
 
 def regress(s, record, k):
-    """What regressions say of an answer (`relgym.model.regression.Regression.values`)."""
+    """What regressions say of an answer (`relgym.model.predicting.regression.Regression.values`)."""
     fit = s.code[record]
     look_at(s, fit)
     width, kinds = s.code[fit], s.code[fit + 3]
@@ -1724,7 +1724,7 @@ def consult(s, a, k, value):
 
 
 def settled(s, a, k, value, outcome, mode, margin, able):
-    """Value, outcome and mode, once it is known how right such predictions were (`relgym.model.querying`)."""
+    """Value, outcome and mode, once it is known how right such predictions were (`running.runner`)."""
     trust = s.code[a + 25]
     winner = -mode if s.code[trust + 4] else mode
     kind = np.int64(PREDICTED if mode else outcome)
@@ -1960,7 +1960,7 @@ def forget(s):
 
 
 def see(s, t, vector, table, close, struck, told, order):
-    """What one body sees of a scene (`relgym.model.sight`).
+    """What one body sees of a scene (`relgym.model.percepts.sight`).
 
     Parameters
     ----------

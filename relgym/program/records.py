@@ -1,8 +1,8 @@
 """The intermediate form: a learned model laid over the objects of a scene, as one typed flat program.
 
 A program says what happens to a row of numbers, and nothing else: it knows columns, constants and operations, no types
-of objects and no names of properties. `relgym.model.lowering` makes it of a model; `relgym.program.tape` writes it as
-two arrays, which `relgym.program.kernel` runs; `relgym.program.source` writes it as Python.
+of objects and no names of properties. `relgym.model.running.lowering` makes it of a model; `relgym.program.tape` writes
+it as two arrays, which `relgym.program.kernel` runs; `relgym.program.source` writes it as Python.
 
 **Registers.** For a state vector of width w, columns 0 … w - 1 hold the present values, w … 2 w - 1 the next ones
 (which begin as copies and are filled in as they become known), 2 w is NaN (missing), 2 w + 1 is 0, 2 w + 2 is 1.
@@ -81,7 +81,7 @@ CONTEXTS = ("approached", "touching", "all")
 """Which objects a clause may mention: what the target approaches fastest, what is close to it, or all."""
 
 EXPERTS = ("own", "guess", "linear", "products", "latest", "persistence")
-"""Who may give a value (`relgym.model.calibration.EXPERTS`): those of whom a `Belief` tells by bits."""
+"""Who may give a value (`relgym.model.predicting.calibration.EXPERTS`): those of whom a `Belief` tells by bits."""
 
 FRAMES = ("contact", "point", "turned", "centres", "own", "world")
 """Frames of contact laws (`relgym.laws.frames`)."""

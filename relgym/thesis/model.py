@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from relgym.arguments import array_of, refusing_calls
 from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError, QueryError, SchemaError
-from relgym.model.learning import LearnReport
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
+from relgym.model.learning.transition import LearnReport
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.scene.objects import POSE, Scene, SceneLayout, Target, Transition
 from relgym.scene.relations import Extractor

@@ -10,8 +10,8 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from relgym.experiments.dyna.speed import WORLDS, dreams
-from relgym.model.compiled import KERNEL
-from relgym.model.lowering import lowered
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.lowering import lowered
 from relgym.model.world_model import WorldModel
 from relgym.program.tape import encoded
 from relgym.scene.objects import Scene
@@ -46,7 +46,7 @@ def test_the_kernel_from_its_cache(benchmark: BenchmarkFixture) -> None:
         "import numpy as np, relgym, time\n"
         "from relgym.scene.objects import ObjectType\n"
         "from relgym.scene.schema import SceneSchema\n"
-        "from relgym.model.compiled import KERNEL\n"
+        "from relgym.model.running.compiled import KERNEL\n"
         "KERNEL.load()\n"
         "s = SceneSchema((ObjectType('b', ('v',)),), (('b', 'b'),))\n"
         "v = np.linspace(1.0, 9.0, 40)[:, None]\n"

@@ -18,7 +18,7 @@ from relgym.errors import ConfigError
 from relgym.experiments.demo import demonstrate_all, demonstrations, learn_online
 from relgym.experiments.episodes import Episode
 from relgym.experiments.plots import Curve, Imagined, Trajectory, draw_curves, draw_trajectories
-from relgym.model.fitting import compare_and_learn
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.world_model import WorldModel
 
 

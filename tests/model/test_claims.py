@@ -15,8 +15,8 @@ from points import schema_of
 from relgym.experiments.laws.trials import trial_rooms
 from relgym.experiments.laws.worlds import Ball, Material, World
 from relgym.experiments.strangers.suite import measure
-from relgym.model.fitting import compare_and_learn
-from relgym.model.prediction import ScenePrediction
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.reporting.parser import parse_rules
 from relgym.scene.objects import Scene, Target, Transition

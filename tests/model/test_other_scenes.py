@@ -9,7 +9,7 @@ import pytest
 
 from relgym.errors import ObservationError
 from relgym.experiments.data import truck_episodes
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema

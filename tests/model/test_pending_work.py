@@ -81,7 +81,9 @@ def test_a_rollback_comes_to_where_the_search_stood(
         model.learn_one(transition)
         calm.learn_one(transition)
     with monkeypatch.context() as patch:
-        patch.setattr("relgym.model.learning._refresh", lambda *given: (_ for _ in ()).throw(MemoryError()))
+        patch.setattr(
+            "relgym.model.learning.transition._refresh", lambda *given: (_ for _ in ()).throw(MemoryError())
+        )
         with pytest.raises(MemoryError):
             model.learn_one(later[8])
     for transition in later[8:]:

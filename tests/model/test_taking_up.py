@@ -16,12 +16,12 @@ import pytest
 from relgym.errors import ObservationError
 from relgym.experiments.bodies.worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
-from relgym.model.fitting import compare_and_learn
-from relgym.model.grounds import Grounds
-from relgym.model.motion import Laws
-from relgym.model.prediction import LateAudit
-from relgym.model.prequential import StepReport, compared
-from relgym.model.querying import predict
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.motion import Laws
+from relgym.model.predicting.prediction import LateAudit
+from relgym.model.predicting.prequential import StepReport, compared
+from relgym.model.predicting.querying import predict
+from relgym.model.running.grounds import Grounds
 from relgym.model.target.hindsight import Standing
 from relgym.model.target.property_model import PropertyModel
 from relgym.model.world_model import WorldModel

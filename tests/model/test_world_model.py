@@ -25,7 +25,7 @@ from worlds import (
 
 from relgym.config import ClusteringConfig, ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, RelgymError, SchemaError
-from relgym.model.prediction import Outcome
+from relgym.model.predicting.prediction import Outcome
 from relgym.model.world_model import WorldModel, with_action
 from relgym.scene.objects import Kinematics, ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema

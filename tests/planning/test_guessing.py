@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import Mode, Role
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.target.limits import Limits
 from relgym.planning.guessing import Guessing
 from relgym.scene.objects import SceneLayout, Target

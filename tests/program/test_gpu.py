@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from programs import MODELS, looked_back, runner, scenes_of
 
 from relgym.errors import ConfigError
-from relgym.model.compiled import KERNEL
-from relgym.model.running import Runner
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.runner import Runner
 from relgym.model.world_model import WorldModel
 from relgym.program import gpu
 from relgym.program.gpu import Card, CardError, ptx, roomy
@@ -79,7 +79,7 @@ class Imitation(Card):
 @pytest.fixture
 def imitated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(KERNEL, "_card", None)
-    monkeypatch.setattr("relgym.model.compiled.Card", Imitation)
+    monkeypatch.setattr("relgym.model.running.compiled.Card", Imitation)
 
 
 def assert_same(asked: Runner, vectors: NDArray[np.float64]) -> None:

@@ -24,8 +24,8 @@ from programs import (
 
 from relgym.experiments.laws.trials import TRIALS
 from relgym.laws.learner import LawLearner
-from relgym.model.lowering import lowered
-from relgym.model.trusting import trusting
+from relgym.model.running.lowering import lowered
+from relgym.model.running.trusting import trusting
 from relgym.scene.objects import Scene
 
 
@@ -102,7 +102,7 @@ def test_a_scene_alone_gets_the_same_bits(name: str) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_single_scene_is_told_as_arrays_tell_it(name: str) -> None:
-    from relgym.model.querying import predict
+    from relgym.model.predicting.querying import predict
 
     model = MODELS[name]()
     layout, vectors = scenes_of(model, 60)

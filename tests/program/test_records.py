@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_programs import Told, by_kernel, by_records, by_source, empty, made
 
-from relgym.model.prediction import OUTCOMES
+from relgym.model.predicting.prediction import OUTCOMES
 from relgym.program import records as ir
 from relgym.program.source import python_source
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from programs import MODELS, arrays, books, crowded, looked_back, room_schema, scenes_of, with_laws
 
 from relgym.laws.learner import LawLearner
-from relgym.model.lowering import lowered
-from relgym.model.prediction import OUTCOMES, BatchPrediction
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction
+from relgym.model.running.lowering import lowered
 from relgym.program.source import python_source
 
 SENTENCES = tuple(outcome.value for outcome in OUTCOMES)

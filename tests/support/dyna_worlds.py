@@ -10,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from relgym.envs.tasks import TaskOutcome
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome, Prediction, ScenePrediction
 from relgym.scene.objects import Float2D, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.scene.shapes import Box

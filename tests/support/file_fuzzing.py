@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
 from relgym.files.reading import ARCHIVE, read_members
-from relgym.model.compiled import KERNEL
 from relgym.model.files.storage import read_model, write_model
 from relgym.model.files.upgrade import upgraded
-from relgym.model.running import PATIENCE
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.runner import PATIENCE
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner

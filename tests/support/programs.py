@@ -25,13 +25,13 @@ from relgym.laws.frames import FRAMES, POINT, axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE, AxisLaw, FreeLaw, PairLaw, Piece, Share
 from relgym.logic.clause import Clause, Coverage, Definition, Literal
-from relgym.model.calibration import EXPERTS, OWN, Audit, Key
-from relgym.model.compiled import KERNEL
-from relgym.model.lowering import lowered
 from relgym.model.parts import Parts
-from relgym.model.prediction import BatchPrediction
-from relgym.model.querying import predict_many
-from relgym.model.running import Runner
+from relgym.model.predicting.calibration import EXPERTS, OWN, Audit, Key
+from relgym.model.predicting.prediction import BatchPrediction
+from relgym.model.predicting.querying import predict_many
+from relgym.model.running.compiled import KERNEL
+from relgym.model.running.lowering import lowered
+from relgym.model.running.runner import Runner
 from relgym.model.target.hindsight import Hindsight
 from relgym.model.target.limits import Limits
 from relgym.model.target.property_model import PropertyModel

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from itertools import product
 
-from relgym.model.prediction import ScenePrediction
+from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.reports.explain import Explanation
 from relgym.scene.contacts import APPROACH_EPS
 from relgym.scene.objects import Scene

@@ -13,7 +13,7 @@ import gymnasium as gym
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from relgym.model.prediction import Outcome, Prediction
+from relgym.model.predicting.prediction import Outcome, Prediction
 from relgym.wrappers import ModelLearner
 
 LIGHT = (

@@ -18,8 +18,8 @@ from relgym.errors import ConfigError, ModelFileError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.files.records import checked
 from relgym.model.files.storage import schema_from_json, schema_to_json
-from relgym.model.prediction import BatchPrediction
-from relgym.model.scenes import mismatch
+from relgym.model.percepts.scenes import mismatch
+from relgym.model.predicting.prediction import BatchPrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import (
     ACTION,

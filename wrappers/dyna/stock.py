@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.errors import ConfigError
-from relgym.model.prediction import BatchPrediction, ScenePrediction
+from relgym.model.predicting.prediction import BatchPrediction, ScenePrediction
 from relgym.scene.objects import ACTION, TASK, Float2D, ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers.dyna.config import DynaConfig

@@ -11,10 +11,10 @@ import numpy as np
 from relgym.envs.arguments import checked_least
 from relgym.envs.dreams.setting import check_knowledge
 from relgym.errors import ConfigError
-from relgym.model.motion import possible_targets
-from relgym.model.prediction import ScenePrediction
-from relgym.model.prequential import Outcomes, Prequential, compared
-from relgym.model.scenes import mismatch
+from relgym.model.percepts.scenes import mismatch
+from relgym.model.predicting.motion import possible_targets
+from relgym.model.predicting.prediction import ScenePrediction
+from relgym.model.predicting.prequential import Outcomes, Prequential, compared
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Scene
 from relgym.scene.schema import SceneSchema

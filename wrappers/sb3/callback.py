@@ -15,7 +15,7 @@ from relgym.config import ModelConfig
 from relgym.envs.arguments import checked_count
 from relgym.envs.views import Angle
 from relgym.errors import ConfigError
-from relgym.model.prequential import Prequential
+from relgym.model.predicting.prequential import Prequential
 from relgym.model.world_model import WorldModel
 from relgym.wrappers.follower import BadObservations
 from relgym.wrappers.observer import First, Observer, Step

@@ -6,7 +6,7 @@ import math
 
 from stable_baselines3.common.logger import Logger
 
-from relgym.model.prequential import Prequential
+from relgym.model.predicting.prequential import Prequential
 
 __all__ = ["log_quality"]
 

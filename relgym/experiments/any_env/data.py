@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
-from relgym.model.scenes import next_values, unwrapped
+from relgym.model.percepts.scenes import next_values, unwrapped
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, Transition
 

@@ -13,7 +13,7 @@ from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.envs.views import TableView
 from relgym.experiments.recording import Recording
-from relgym.model.prediction import ScenePrediction
+from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target, Transition

@@ -16,7 +16,7 @@ from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.experiments.any_env.data import STUDIES, Lesson, collect, recommended
 from relgym.experiments.criterion import Measure, measured
-from relgym.model.fitting import compare_and_learn
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
 

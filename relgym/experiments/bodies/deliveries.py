@@ -11,7 +11,7 @@ import numpy as np
 from relgym.experiments.dyna import arms as dyna_arms
 from relgym.experiments.dyna import course as dyna
 from relgym.experiments.plan.course import Course, NeuralSimulator, Tests
-from relgym.model.fitting import compare_and_learn
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.world_model import WorldModel
 from relgym.planning import ModelSimulator, Objective, Planner, PlanningAgent, TreeSearch
 from relgym.planning.simulators import Simulator

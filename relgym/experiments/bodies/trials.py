@@ -21,8 +21,8 @@ from relgym.laws.inertia import AREA, SQUARE
 from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Contacts
-from relgym.model.fitting import compare_and_learn
-from relgym.model.prediction import OUTCOMES, Outcome, ScenePrediction
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.prediction import OUTCOMES, Outcome, ScenePrediction
 from relgym.model.world_model import WorldModel
 from relgym.scene.geometry.areas import mean_squares
 from relgym.scene.objects import Float2D, SceneLayout, Transition

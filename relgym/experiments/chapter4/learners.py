@@ -13,7 +13,7 @@ from relgym.clustering.roles import bind
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError
 from relgym.experiments.episodes import Episode
-from relgym.model.perception import Perception
+from relgym.model.percepts.perception import Perception
 from relgym.model.reports.report import report
 from relgym.model.reports.tables import ModelReport
 from relgym.model.world_model import WorldModel

@@ -13,7 +13,7 @@ from relgym.experiments.chapter4.learners import Learner, governed, mode_values,
 from relgym.experiments.chapter4.scores import target_score
 from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import TOLERANCE, explicable, mode_labels
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 
 __all__ = ["TARGETS", "confusions", "scores_of", "true_modes"]
 

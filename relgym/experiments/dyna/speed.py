@@ -17,7 +17,7 @@ from relgym.config import ModelConfig
 from relgym.envs import LearnedModelVectorEnv, drawn_from
 from relgym.experiments.data import ball_episodes
 from relgym.experiments.seeds import TUNING_SEEDS, TUNING_TEST_SEED
-from relgym.model.compiled import KERNEL
+from relgym.model.running.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
 

@@ -18,7 +18,7 @@ from relgym.envs.truck_push import GRAVITY
 from relgym.experiments.dyna import arms as dyna_arms
 from relgym.experiments.dyna import course as dyna
 from relgym.experiments.dyna.course import ENOUGH, EPISODES, solved_at
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.planning import EnvSimulator, Objective, Planner, PlanningAgent, Steps, TreeSearch
 from relgym.planning.review import right
 from relgym.scene.objects import Float1D, Float2D, Scene, Transition

@@ -14,7 +14,7 @@ import numpy as np
 
 from relgym.errors import ConfigError
 from relgym.experiments.dyna.speed import HORIZONS, dreams, engine, rate
-from relgym.model.compiled import KERNEL
+from relgym.model.running.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float2D, SceneLayout
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from relgym.errors import RelgymError
 from relgym.experiments.rooms import rooms
-from relgym.model.fitting import compare_and_learn
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Float2D, ObjectType, Scene, Transition
 from relgym.scene.schema import SceneSchema

@@ -36,10 +36,10 @@ from relgym.experiments.criterion import measured
 from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.experiments.strangers.library import BASELINES, predicted, ridge, short
 from relgym.experiments.strangers.made import MADE, TEXTBOOK
-from relgym.model.compiled import KERNEL
-from relgym.model.fitting import compare_and_learn
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.reports.text import Cell, table
+from relgym.model.running.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 

@@ -32,7 +32,6 @@ from relgym.laws.frames import axis_names
 from relgym.laws.learner import LawLearner
 from relgym.laws.records import ONE
 from relgym.laws.shares import EXTENT
-from relgym.model.calibration import EXPERTS
 from relgym.model.files.format import (
     AxisLawRecord,
     Body,
@@ -56,6 +55,7 @@ from relgym.model.files.format import (
     TreeRecord,
 )
 from relgym.model.parts import Parts
+from relgym.model.predicting.calibration import EXPERTS
 from relgym.model.target.conditions import Conditions
 from relgym.scene.axes import Axes
 from relgym.scene.objects import Target

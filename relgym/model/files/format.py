@@ -671,7 +671,7 @@ class ReportRecord(Record):
 
 
 class ScreenRecord(Record):
-    """What sizes of numbers are known, by which gross errors are told (`relgym.model.screening`).
+    """What sizes of numbers are known, by which gross errors are told (`relgym.model.percepts.screening`).
 
     Of each property its type and name, in how many scenes it was seen, its largest magnitudes in ascending order, the
     suspicious numbers that wait for others like them, and how many transitions in a row held one.

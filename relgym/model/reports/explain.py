@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from relgym.logic.csp import solutions, world_of
-from relgym.model.calibration import EXPERTS
-from relgym.model.prediction import Prediction
+from relgym.model.predicting.calibration import EXPERTS
+from relgym.model.predicting.prediction import Prediction
 from relgym.model.reports.rules import functions_of, tested
 from relgym.model.reports.text import amount
 from relgym.reporting.conditions import Test

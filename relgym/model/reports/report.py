@@ -11,7 +11,7 @@ from relgym.classification.role_classifier import RoleKind
 from relgym.clustering.mode import Mode
 from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.reports.advice import Advice
 from relgym.model.reports.rules import agreement
 from relgym.model.reports.spread_text import spread_text

@@ -39,7 +39,7 @@ from relgym.clustering.mode import Mode
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
 from relgym.model.target.spread import ROUNDING
 from relgym.numeric.decision_list import Rule, decision_list

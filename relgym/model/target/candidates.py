@@ -31,7 +31,7 @@ MOST_ROWS = 2_000
 
 
 class Candidates:
-    """Laws of registered classes for one target; whether they speak is decided by `relgym.model.calibration`.
+    """Laws of registered classes for one target; whether they speak, calibration decides.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import NOISE
 from relgym.clustering.roles import Binding
 from relgym.config.constants import ROUGH
-from relgym.model.perception import Percept
+from relgym.model.percepts.perception import Percept
 from relgym.model.target.functions import BoundFunctions
 from relgym.model.target.guess import Guess, Guesses
 from relgym.model.target.scope import EVERYWHERE

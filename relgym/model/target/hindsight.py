@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.calibration import OWN, Calibration, Key
-from relgym.model.prediction import Outcome, Prediction, ScenePrediction
+from relgym.model.predicting.calibration import OWN, Calibration, Key
+from relgym.model.predicting.prediction import Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Answer, Parts

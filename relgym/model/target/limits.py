@@ -19,7 +19,7 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
-from relgym.model.prediction import Prediction
+from relgym.model.predicting.prediction import Prediction
 
 __all__ = ["EXPLAINED", "LATEST", "Limits", "constants", "find_limits", "furthest"]
 

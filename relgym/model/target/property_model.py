@@ -20,10 +20,10 @@ from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
 from relgym.config.constants import HOPELESS, LEFT_OPEN, SEARCHED_CELLS
-from relgym.model.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
-from relgym.model.grouping import distinct, members
-from relgym.model.perception import Percept, Situation
-from relgym.model.prediction import OUTCOMES, Outcome, Prediction
+from relgym.model.percepts.grouping import distinct, members
+from relgym.model.percepts.perception import Percept, Situation
+from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
+from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.target.candidates import Candidates
 from relgym.model.target.casting import Casting
 from relgym.model.target.conditions import Conditions, needed

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relgym.envs.dreams.ends import CAUSES, Cause, causes, explained, horizon_reached, parts_of_row
-from relgym.model.prediction import OUTCOMES, BatchPrediction, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.scene.objects import ObjectType
 from relgym.scene.schema import SceneSchema
 

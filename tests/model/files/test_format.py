@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from relgym.errors import ModelFileError
 from relgym.files.records import checked
-from relgym.model.calibration import EXPERTS, Audit, Calibration, Key
 from relgym.model.files.format import CalibrationRecord
+from relgym.model.predicting.calibration import EXPERTS, Audit, Calibration, Key
 
 
 def looked_back(sizes: list[float], steps: int) -> Calibration:

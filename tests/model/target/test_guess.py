@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
-from relgym.model.prediction import Outcome
+from relgym.model.predicting.prediction import Outcome
 from relgym.model.target.guess import MEMORY, Guesses, _terms
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target, Transition

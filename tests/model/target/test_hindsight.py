@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
-from relgym.model.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
+from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.target.hindsight import LEAST, RECOVERED, SHARE, WINDOW, Hindsight
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition

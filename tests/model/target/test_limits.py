@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relgym.config import ModelConfig
-from relgym.model.prediction import Outcome, Prediction
+from relgym.model.predicting.prediction import Outcome, Prediction
 from relgym.model.reports.explain import explain
 from relgym.model.reports.report import describe
 from relgym.model.target.limits import Limits

@@ -11,7 +11,7 @@ from relgym.clustering.mode import NOISE
 from relgym.config import ModelConfig
 from relgym.errors import QueryError
 from relgym.experiments.data import truck_episodes
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import bodies_of
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition

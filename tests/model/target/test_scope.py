@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from points import learned, schema_of, transitions
 
-from relgym.model.prediction import OUTCOMES, Outcome
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.scope import EVERYWHERE, Scope
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Transition

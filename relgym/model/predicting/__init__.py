@@ -1,0 +1,1 @@
+"""What follows a scene, how right that is, and how right it was."""

@@ -1,0 +1,1130 @@
+"""How right predictions like this one were: who gives the value, how probably it is right, and its interval.
+
+Several experts have a value for what comes next: the mode or law that won, the guess, regressions on everything, and
+that nothing changes. A learner that predicts before each step reports how each of them came out
+(`WorldModel.look_back`), and that is counted in *cells*: by outcome, winner, and how far it led its runner-up, or of an
+approximation how far from what it was made of it is asked; in those of its winner where there are few trials. Of a cell
+
+- the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
+  `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
+  where it is hardly worse;
+- the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
+  laws, said with this outcome; and until the first miss what speaks may be a law that is always right. A hit is off by
+  no more than `ModelConfig.claim_error` of what mostly changes;
+- the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
+
+Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
+law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was
+believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
+known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
+Where it had none yet, all cells together tell whether it speaks.
+
+Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
+the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
+it is learned again when a mode holds, and then without an error in a world that laws explain, what it got wrong before
+was another rule's fault: its record begins anew (`Calibration.revise`), with less credit each time.
+
+A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
+Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
+`ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
+from the records of those who speak now: what slipped before a law was known isn't held against the law. An
+approximation isn't claimed further out than it was asked and right, however right it is near: a misfit grows. Of a
+model that was never told how its predictions came out nothing is known, and nothing is doubted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from typing import Any, Final, NamedTuple
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from relgym.config.constants import EVIDENCE, SUMMABLE
+
+__all__ = [
+    "EXPERTS",
+    "Assessment",
+    "Audit",
+    "Calibration",
+    "Key",
+    "far_bin",
+    "far_bins",
+    "key_of",
+    "keys_of",
+    "lead_bins",
+]
+
+EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
+"""Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
+since what decides may be hidden, and a law that changed stays changed; and that nothing changes."""
+
+OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(len(EXPERTS))
+
+_KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
+"""What anybody would try first."""
+
+_FITTED: Final = (GUESS, LINEAR, PRODUCTS)
+"""Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i,
+as least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
+
+_VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
+"""Who makes no claims."""
+
+_BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
+"""Who speaks before anything is known, the first of them who has a value."""
+
+MEMORY: Final = 1024
+"""Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
+of 10 bits is one of 1.4 % in root mean square."""
+
+FEW: Final = 32
+"""In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
+
+LEAVE: Final = 1.1
+"""A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
+
+PRIOR: Final = 1.0
+"""Trials that the prior of a share counts for, as Jeffreys' does."""
+
+COVERED: Final = 0.95
+"""Share of what comes that intervals are to hold."""
+
+ENOUGH: Final = 19
+"""Fewest errors that can tell such an interval: the largest of them does then."""
+
+OCTAVE: Final = 4
+"""Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
+
+_EXACT: Final = -(1 << 14)
+"""The bin of errors no larger than rounding."""
+
+
+NO_RUNNER_UP: Final = 7
+"""Bin of leads where there is nobody to lead."""
+
+FAR: Final = range(NO_RUNNER_UP, NO_RUNNER_UP + NO_RUNNER_UP)[1:]
+"""Bins of leads of approximations that are asked far from what they were made of, as many as of leads: octaves of the
+squared distance (`relgym.model.predicting.regression.Regressed`), with which a misfit grows."""
+
+OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
+"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
+
+
+class Key(NamedTuple):
+    """A cell: number of the outcome, winner (a mode's id, laws below 0; 0: none), and bin of its lead."""
+
+    outcome: int
+    winner: int
+    lead: int
+
+
+class Audit(msgspec.Struct, frozen=True, gc=False):
+    """What looking back at a prediction needs: its cell, what each of `EXPERTS` said (NaN: nothing), and who spoke."""
+
+    key: Key
+    values: tuple[float, ...]
+    speaker: int = 0
+
+
+class Assessment(NamedTuple):
+    """What is made of a prediction.
+
+    Attributes
+    ----------
+    speaker
+        Place in `EXPERTS` of who gives the value.
+    probability
+        That it is right; NaN where nothing is known.
+    interval
+        Half width of the 95 % interval, in units of the property; NaN where too little is known.
+    spread
+        Root mean square of what the speaker left lately; NaN where nothing is known.
+    """
+
+    speaker: int
+    probability: float
+    interval: float
+    spread: float
+
+
+@lru_cache
+def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
+    """The cell of a prediction; most margins come again and again. `far`: see `far_bin`."""
+    if far:
+        return Key(outcome, winner, far)
+    if not margin > 0.0:
+        return Key(outcome, winner, 0)
+    if math.isinf(margin):
+        return Key(outcome, winner, NO_RUNNER_UP)
+    return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), NO_RUNNER_UP - 1))
+
+
+def far_bin(distance: float) -> int:
+    """The bin of a squared distance (`FAR`); 0: it is below 2, about twice the mean of what was learned."""
+    if not distance >= 2.0:
+        return 0
+    return FAR[-1] if math.isinf(distance) else min(NO_RUNNER_UP - 1 + math.frexp(distance)[1], FAR[-1])
+
+
+def far_bins(distances: NDArray[np.float64]) -> NDArray[np.int64]:
+    """`far_bin` of n squared distances."""
+    _, exponents = np.frexp(np.where(np.isfinite(distances), distances, 1.0))
+    found = np.where(distances >= 2.0, np.minimum(NO_RUNNER_UP - 1 + exponents, FAR[-1]), 0)
+    return np.where(np.isposinf(distances), FAR[-1], found).astype(np.int64)
+
+
+def keys_of(
+    outcomes: NDArray[np.int8],
+    winners: NDArray[np.int64],
+    margins: NDArray[np.float64],
+    far: NDArray[np.int64] | None = None,
+) -> Iterator[tuple[Key, NDArray[np.intp]]]:
+    """The cells of n predictions, and which of them lie in each; `far`: see `far_bins`."""
+    leads = lead_bins(margins)
+    if far is not None:
+        leads = np.where(far > 0, far, leads)
+    for rows in _groups((winners << 10) + (outcomes.astype(np.int64) << 4) + leads):
+        first = rows[0]
+        yield Key(int(outcomes[first]), int(winners[first]), int(leads[first])), rows
+
+
+def _groups(codes: NDArray[np.int64]) -> Iterator[NDArray[np.intp]]:
+    """Places of equal numbers, in ascending order, number by number."""
+    order = np.argsort(codes, kind="stable")
+    ends = np.flatnonzero(np.diff(codes[order])) + 1
+    yield from np.split(order, ends) if len(codes) else ()
+
+
+def lead_bins(margins: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Bins of leads. 0: no lead; else by octaves of the log-odds; `NO_RUNNER_UP`."""
+    _, exponents = np.frexp(np.where(np.isfinite(margins), margins, 1.0))
+    found = np.where(margins > 0.0, np.clip(exponents + 2, 1, NO_RUNNER_UP - 1), 0)
+    return np.where(np.isposinf(margins), NO_RUNNER_UP, found).astype(np.int64)
+
+
+@dataclass(slots=True)
+class _Record:
+    """How one expert's values came out, the older ones counting less."""
+
+    trials: float = 0.0
+    hits: float = 0.0
+    run: int = 0  # of hits (> 0) or misses (< 0), up to now
+    errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
+    # Over: trials in those of misses, of hits; how many. Then the mean length of those of hits in the two records
+    # before this one that misses ended; 0: there was none.
+    runs: list[float] = field(default_factory=lambda: [0.0] * 6)
+    revised: int = 0  # how often what tells when a mode holds was learned again after it had been wrong
+    _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
+
+    def add(self, hit: bool, times: int, *, fitted: bool) -> None:
+        """Take in a value that nobody claims, so that no run of hits or misses needs to be noticed at once."""
+        if fitted and self.trials:  # weights of (i / n)^2 sum to n / 3
+            kept = max(1.0 - 2.0 * times / (3.0 * self.trials), 0.0)
+            self.trials, self.hits = kept * self.trials, kept * self.hits
+        self.trials += times
+        self.hits += times * hit
+        if self.trials > MEMORY:
+            self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+
+    def count(self, error: float, within: float, times: int = 1) -> bool:
+        """Take in an error, which is a hit if it is no larger than so much; whether that ends what was known before."""
+        self.errors = _counted(self.errors, _place(error), times)
+        hit = error <= within
+        if hit and self.run > 0 and self.run >= self.trials:  # of what was always right nothing ends
+            self.run += times
+            self.trials, self.hits = self.trials + times, self.hits + times
+            if self.trials > MEMORY:
+                self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+            return False
+        if hit != (self.run > 0):
+            if self.run:
+                was = self.run > 0
+                self.runs[was] += abs(self.run)
+                self.runs[2 + was] += 1.0
+            self.run = 0
+        self.run += times if hit else -times
+        # The run under way isn't part of the record that it is held against.
+        length = abs(self.run)
+        before = max(self.trials - (length - times), 0.0)
+        share = (max(self.hits - max(self.run - times, 0), 0.0) + 0.5) / (before + 1.0)
+        one = share if hit else max(1.0 - share, 1e-300)
+        # Where hits, or misses, mostly come in long runs, another one is no news.
+        trials, ends = self.runs[hit], self.runs[2 + hit]
+        again = max(one, (trials - ends + one) / (trials + 1.0))
+        # It may have begun at any of the trials, which takes the logarithm of their number to say.
+        bits = -math.log2(one) - (length - 1) * math.log2(again) - math.log2(before + 1.0)
+        self.trials += times
+        self.hits += times * hit
+        # Hits come in runs where little happens: what was doubted is believed after more of them; what came and went
+        # twice comes and goes.
+        ended = (
+            before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= max(FEW, 2.0 * min(self.runs[4:])))
+        )
+        if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
+            self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
+            if not hit and self.runs[3]:
+                self.runs[4:] = self.runs[5], self.runs[1] / self.runs[3]
+            self.runs[:4] = [0.0] * 4
+        if self.trials > MEMORY:
+            self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
+        if self.runs[0] + self.runs[1] > MEMORY:
+            self.runs[:4] = [0.5 * each for each in self.runs[:4]]
+        return ended
+
+    def even(self) -> float:
+        """`share` after a prior that says nothing; worked out once between trials."""
+        if self._even is None or self._even[:2] != (self.trials, self.hits):
+            self._even = (self.trials, self.hits, self.share(0.5))
+        return self._even[2]
+
+    def mean(self, prior: float) -> float:
+        """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
+        return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+
+    def share(self, prior: float, bits: float = 0.0) -> float:
+        """How probably the next one is a hit.
+
+        One part of the prior has it that hits come in some share (`mean`). The other one, larger by so many bits, that
+        what speaks is a law and always right: that holds until the first miss. Who was revised r times, and failed each
+        time, will be right with the odds of 1 to 2 r + 1 (Jeffreys' prior), whoever else is.
+        """
+        failed = 2 * self.revised + 1
+        some, bits = self.mean(min(prior, 1.0 / failed)), bits - math.log2(failed)
+        if self.hits < self.trials or not (self.trials or bits):
+            return some
+        n = (
+            self.trials
+        )  # all hits: how likely is that in a share of which nothing is known (Jeffreys' prior)?
+        by_chance = math.exp(math.lgamma(n + 0.5) - math.lgamma(n + 1.0) - bits * math.log(2.0))
+        by_chance /= math.sqrt(math.pi)
+        return 1.0 - (1.0 - some) * by_chance / (1.0 + by_chance)
+
+
+@dataclass(slots=True)
+class _Cell:
+    """Predictions of one kind."""
+
+    speaker: int
+    # Of the winner, of the speaker and of all who make no claims; only those who speak have bins of errors.
+    records: dict[int, _Record]
+    squares: list[
+        list[float]
+    ]  # for each expert: trials, its squares, those of persistence in the same trials
+    heard: float = 0.0  # predictions, those of long ago counting less
+    # Predictions in a row, up to now, that came out as such ones do; of rough ones in the cell of their winner.
+    steady: int = 0
+    passed: int = 0  # predictions left out lately: the next one that is learned from stands for these, too
+    doubt: float = 0.0  # bits by which a winner's intervals held less often lately than they are to
+    # Hits in a row since the winner was claimed though what it read was predicted wrongly; None: that is over.
+    since: int | None = None
+    _sure: tuple[float, float] | None = field(
+        default=None, repr=False, compare=False
+    )  # by bits, since the last trial
+
+    @classmethod
+    def new(cls, speaker: int, experts: int) -> _Cell:
+        return cls(speaker, {}, [[0.0, 0.0, 0.0] for _ in range(experts)])
+
+    def note(self, speaker: int, errors: Sequence[float], within: float, times: int = 1) -> None:
+        """Take in whether the winner and the speaker were right, no more; so many times."""
+        self._sure = None
+        for expert in {OWN, speaker}:
+            self._hear(expert, errors[expert], within, times, speaks=True)
+
+    def _hear(self, expert: int, error: float, within: float, times: int, *, speaks: bool) -> None:
+        """Take in what one expert was off by, if it had a value."""
+        if error != error:
+            return
+        record = self.records.setdefault(expert, _Record())
+        if _makes_claims(expert):
+            if record.count(error, within, times):
+                self.squares[expert] = [0.0, 0.0, 0.0]
+            return
+        record.add(error <= within, times, fitted=expert in _FITTED)
+        if speaks:
+            record.errors = _counted(record.errors, _place(error), times)
+
+    def count(self, errors: Sequence[float], within: float, times: int = 1) -> None:
+        """Take in what each expert was off by, so many times; the best one speaks, if it leads by enough."""
+        self._sure = None
+        for expert in {OWN, self.speaker, *_VALUES}:
+            self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker))
+        base = errors[PERSISTENCE] ** 2
+        for sums, error in zip(self.squares, errors, strict=True):
+            if error == error:
+                if sums[0] >= MEMORY:
+                    sums[:] = [0.5 * s for s in sums]
+                sums[0] += times
+                sums[1] += times * error * error
+                sums[2] += times * base
+        if errors[self.speaker] == 0.0 and self.squares[self.speaker][1] == 0.0:
+            return  # nobody is better than who was never off
+        best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
+        if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
+            self.records = {k: r for k, r in self.records.items() if k in (OWN, *_VALUES)}
+            if self.speaker in _VALUES:
+                self.records[self.speaker].errors = {}
+            self.speaker = best
+
+    @classmethod
+    def united(cls, cells: Sequence[_Cell], experts: int) -> _Cell:
+        """What some cells know together, of whoever spoke in one of them; runs have no order then."""
+        found = cls.new(PERSISTENCE, experts)
+        for cell in cells:
+            for sums, more in zip(found.squares, cell.squares, strict=True):
+                sums[:] = [a + b for a, b in zip(sums, more, strict=True)]
+            for expert, record in cell.records.items():
+                known = found.records.setdefault(expert, _Record())
+                known.trials += record.trials
+                known.hits += record.hits
+                for place, count in record.errors.items():
+                    known.errors[place] = known.errors.get(place, 0.0) + count
+        return found
+
+    def credit(self, prior: float, bits: float) -> float:
+        """How probably what the winner reads is right again: as what failed once, and was right ever since."""
+        if self.since is None:
+            return 1.0
+        return _Record(self.since, self.since, revised=1).share(prior, bits)
+
+    def drop(self, expert: int) -> None:
+        """Forget how an expert did: another one takes its place."""
+        self.records.pop(expert, None)
+        self.squares[expert] = [0.0, 0.0, 0.0]
+
+    def sure(self, claims: tuple[float, float], bits: float) -> float:
+        """How probably what would be claimed is right, after this record alone; 0 if no mode and no law speaks."""
+        if self._sure is None or self._sure[0] != bits:
+            able = [k for k, sums in enumerate(self.squares) if sums[0]]
+            speaker = self.preferred(able, claims) if able else OWN
+            known = self.records.get(speaker)
+            share = 0.5 if known is None else known.share(0.5, bits)
+            self._sure = bits, share if _makes_claims(speaker) else 0.0
+        return self._sure[1]
+
+    def left(self, expert: int) -> float:
+        """Squares left of what saying that nothing changes leaves; infinite if the expert was never heard."""
+        trials, own, base = self.squares[expert]
+        if not trials:
+            return math.inf
+        return max(
+            (own + 1e-300) / (base + 1e-300), math.ulp(0.0)
+        )  # of huge changes an exact law leaves less
+
+    def lead(self, expert: int, other: int) -> float:
+        """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
+        trials = min(self.squares[expert][0], self.squares[other][0] or math.inf)
+        ratio = self.left(other) / self.left(expert)
+        return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
+
+    def preferred(self, able: Collection[int], claims: tuple[float, float]) -> int:
+        """Who of those who have a value speaks.
+
+        The winner where that can be claimed, is right as often as who codes best (or as it takes for all to be
+        claimed), and leaves hardly more than what anybody would try; else who codes best.
+        """
+        own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
+        probability, slips = claims
+        least = max(probability, min(other.even(), 1.0 - slips))
+        if OWN in able and own is not None and own.even() >= least:
+            least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
+            if self.left(OWN) <= LEAVE * LEAVE * least:
+                return OWN
+        return self.speaker if self.speaker in able else min(able, key=self.left)
+
+
+class Calibration:
+    """The record of one target's predictions.
+
+    Parameters
+    ----------
+    probability
+        How probable it must be that what the winner says is right, for it to be claimed
+        (`ModelConfig.claim_probability`).
+    slips
+        Share of predictions that may be expected to be claimed and off (`ModelConfig.claim_slips`).
+    hypotheses
+        Laws of `ModelConfig.hypotheses`: experts behind those that there always are.
+
+    Attributes
+    ----------
+    trials
+        Predictions that somebody looked back at.
+    """
+
+    def __init__(self, probability: float = 0.9, slips: float = 0.0075, hypotheses: int = 0) -> None:
+        self.probability, self.allowed = probability, slips
+        self.experts = len(EXPERTS) + hypotheses
+        self.trials = 0
+        self._cells: dict[Key, _Cell] = {}
+        self._changes: dict[int, float] = {}  # changes by bin of their size
+        self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
+        self._claimed: dict[tuple[Key, Assessment], bool] = {}
+        self._least: dict[int, float] = {}  # probability that claims need, by who makes them
+        self._kinds: dict[int, list[_Cell]] = {}  # cells of kinds of predictions, by who makes them
+        self._vouched = (
+            0.0  # bits by which laws, when they came in force, described what came better than modes
+        )
+        self._everyone = tuple(range(self.experts))
+        self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
+        self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
+        self._united: _Cell | None = None  # see `_whole`
+
+    def __getstate__(self) -> dict[str, Any]:
+        cached = ("_assessed", "_verdicts", "_claimed", "_least", "_kinds")
+        return self.__dict__ | {name: {} for name in cached} | {"_united": None}
+
+    def _changed(self, *, cells: bool = True) -> None:
+        """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
+        self._assessed.clear()
+        self._verdicts.clear()
+        self._claimed.clear()
+        self._least.clear()
+        self._united = None
+        if cells:
+            self._kinds.clear()
+
+    @property
+    def change(self) -> float:
+        """Median of what the property changed by lately where it changed, in its units; 0 if it never did.
+
+        A median, since a few crashes make most of the squares, and no outlier is to say what is right.
+        """
+        return _quantile(self._changes, 0.5, self._changes.get(_EXACT, 0.0))
+
+    @property
+    def slips(self) -> float:
+        """Share of the latest predictions that were claimed and off."""
+        return self._slips[1] / max(self._slips[0], 1.0)
+
+    # ------------------------------------------------------------------ what is made of a prediction
+    def assess(self, key: Key, values: Sequence[float]) -> Assessment:
+        """Who gives the value of a prediction, and how far that can be relied on."""
+        return self._known(key, _able(values))
+
+    def verdict(self, key: Key, values: Sequence[float]) -> tuple[Assessment, bool]:
+        """What `assess` and `claims` say of a prediction; worked out once between changes."""
+        held = tuple(map(math.isfinite, values))
+        if (known := self._verdicts.get((key, held))) is None:
+            told = self._known(key, _places(held))
+            known = self._verdicts[key, held] = told, self.claims(key, told)
+        return known
+
+    def own_word(self, key: Key) -> Assessment | None:
+        """What is made of a prediction if the winner has the word whatever others say; None where that depends."""
+        told = self._known(key, self._everyone)
+        return told if told.speaker == OWN else None
+
+    def _known(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        """`_assess`, worked out once between changes."""
+        if (known := self._assessed.get((key, able))) is None:
+            known = self._assessed[key, able] = self._assess(key, able)
+        return known
+
+    def assess_many(
+        self, key: Key, values: NDArray[np.float64]
+    ) -> Iterator[tuple[NDArray[np.intp], Assessment]]:
+        """`assess` of n predictions in one cell, ``values`` of shape ``(n, experts)``."""
+        able = np.isfinite(values)
+        for rows in _groups(able @ (1 << np.arange(values.shape[1]))):
+            yield rows, self.assess(key, np.where(able[rows[0]], 0.0, np.nan).tolist())
+
+    def table(
+        self, outcomes: int, able: Sequence[int], *, distant: bool = False
+    ) -> Iterator[tuple[Key, int, Assessment, bool]]:
+        """What is made of every kind of predictions: a table that says of any prediction what `assess` and `claims` do.
+
+        A prediction whose cell isn't listed is of the kind of its winner (a lead of `OF_WINNER`); one whose winner
+        isn't listed of the kind of its family (`OF_FAMILY`, and 1, -1 or 0 for a winner).
+
+        Parameters
+        ----------
+        outcomes
+            Numbers of outcomes are smaller than this.
+        able
+            Experts who may have a value, as bits by their places in `EXPERTS`, set by set; persistence always has one.
+        distant
+            Whether kinds far from what was learned are asked for (`far_bin`): all there may be of every winner.
+
+        Yields
+        ------
+        Key, set of experts, what is made of it, and whether it is claimed.
+        """
+        nowhere = 1 << 20
+        families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
+        rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] << 40, nowhere)) for each in families]
+        rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
+        kinds = {k for k in self._cells if k.lead >= 0}
+        if distant:
+            of = [k for k in self._cells if k.lead == OF_WINNER and k.winner > 0]
+            kinds |= {k._replace(lead=far) for k in of for far in FAR}
+        rows += [(k, k) for k in sorted(kinds)]
+        for shown, key in rows:
+            for bits in able:
+                having = tuple(k for k in range(len(EXPERTS)) if bits >> k & 1 or k == PERSISTENCE)
+                told = self._assess(key, having)
+                yield shown, bits, told, self.claims(key, told)
+
+    def _assess(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        if self._far_out(key) and key not in self._cells:
+            return self._further(key, able)
+        family, winner, cell = (self._cells.get(each) for each in _levels(key))
+        family = family if key.winner else None
+        bits = self._bits(_who(key))
+        known = [c for c in (winner, cell) if c is not None and c.squares[PERSISTENCE][0]]
+        if known:
+            trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
+            speaker = trusted.preferred(able, (self.probability, self.allowed))
+            better = self._unheard(trusted, speaker, able)
+            if better is not None:
+                speaker, trusted = better, self._whole()
+                family, known = trusted, [trusted]
+        elif not self._cells or (OWN in able and self._vouches(family, bits)):
+            speaker = next(k for k in _BY_DEFAULT if k in able)
+        else:  # of a new winner nothing is known, and of those like it nothing good
+            trusted = family = self._whole()
+            speaker = min((k for k in able if k not in (OWN, LATEST)), key=trusted.left)
+            if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
+                speaker = PERSISTENCE
+            known = [trusted]
+        latest = next((c for c in (cell, winner) if c is not None and speaker in c.records), None)
+        said = _Record() if latest is None else latest.records[speaker]
+        prior, bits = _mean(family, speaker), bits if speaker == OWN else 0.0
+        share = said.share(prior, bits) if self.trials else math.nan
+        if latest is not None and speaker == OWN:
+            share = min(share, latest.credit(prior, bits))
+        if not known:
+            return Assessment(speaker, share, math.nan, math.nan)
+        record = trusted.records.get(speaker)
+        few = record is None or sum(record.errors.values()) < ENOUGH
+        half = math.nan if record is None or few else _quantile(record.errors, COVERED)
+        trials, squares, _ = trusted.squares[speaker]
+        return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _far_out(self, key: Key) -> bool:
+        """Whether an approximation that was asked before is asked far from what it was made of."""
+        return key.lead in FAR and _winner(key) in self._cells
+
+    def _further(self, key: Key, able: tuple[int, ...]) -> Assessment:
+        """What is made of an approximation further than it was ever asked: who spoke nearer does, no surer than not."""
+        nearer = key
+        while nearer.lead in FAR and nearer not in self._cells:
+            nearer = nearer._replace(lead=nearer.lead - 1)
+        told = self._assess(nearer, able)
+        return told._replace(probability=min(told.probability, 0.5))
+
+    def _unheard(self, cell: _Cell, speaker: int, able: tuple[int, ...]) -> int | None:
+        """Who was never heard in a cell, but elsewhere codes best by enough; None: nobody, or a mode or law speaks."""
+        if _makes_claims(speaker):
+            return None
+        others = [k for k in able if k in _VALUES and not cell.squares[k][0]]
+        if not others:
+            return None
+        whole = self._whole()
+        best = min(others, key=whole.left)
+        return best if whole.lead(best, speaker) >= EVIDENCE else None
+
+    def _vouches(self, family: _Cell | None, bits: float) -> bool:
+        """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.
+
+        Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
+        """
+        if not _Record().share(_mean(family, OWN), bits) > self.probability:
+            return False
+        left = self._whole().left(OWN)
+        return math.isinf(left) or left <= LEAVE * LEAVE
+
+    def _whole(self) -> _Cell:
+        """What all cells know together."""
+        if self._united is None:
+            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _WHOLE]
+            self._united = _Cell.united(cells, self.experts)
+        return self._united
+
+    def claims(self, key: Key, told: Assessment) -> bool:
+        """Whether a prediction in a cell is claimed: a mode or a law speaks, and it is right probably enough.
+
+        The surest kinds are claimed first, as many as may together be expected to be off in no more than the share
+        allowed of what is predicted, and once more: a single miss tells no share. What doesn't speak any more isn't
+        counted: neither modes where laws predict, nor the reverse.
+        """
+        if not _makes_claims(told.speaker):
+            return False
+        if not self.trials:
+            return True
+        if (known := self._claimed.get((key, told))) is None:
+            known = self._claimed[key, told] = self._claims(key, told)
+        return known
+
+    def _claims(self, key: Key, told: Assessment) -> bool:
+        """`claims` of what somebody looked back at, worked out once between changes."""
+        who, cell = _who(key), self._cells.get(key)
+        if self._far_out(key) and (cell is None or cell.squares[PERSISTENCE][0] < FEW):
+            return False  # too few have shown what an approximation is worth there
+        if who not in self._least:
+            self._least[who] = self._needed(who)
+        like = [cell] if cell is not None else self._alike(key)
+        claims, bits = (self.probability, self.allowed), self._bits(who)
+        # Nothing like it is left: what became of it is known, or it has never been tried.
+        others = 0.0 if _family(key) in self._cells else told.probability
+        share = min([c.sure(claims, bits) for c in like], default=others)
+        if cell is None and told.probability >= 1.0 - self.allowed:  # rations aren't needed
+            share = max(share, told.probability)
+        return min(told.probability, share) > self.probability and share >= self._least[who]
+
+    def _alike(self, key: Key) -> list[_Cell]:
+        """Kinds of predictions of which one that was never seen, and isn't rationed therefore, is no surer than any.
+
+        Those of its winner; of a winner that was never seen, those of all modes, or all laws.
+        """
+        kinds = [
+            (k, c)
+            for k, c in self._cells.items()
+            if k.lead >= 0 and k.outcome == key.outcome and c.heard >= 1.0
+        ]
+        own = [c for k, c in kinds if k.winner == key.winner]
+        return own or [c for k, c in kinds if _who(k) == _who(key)]
+
+    def _needed(self, who: int) -> float:
+        """The least probability that is claimed."""
+        kinds = self._kinds.get(who)
+        if kinds is None:
+            kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
+            self._kinds[who] = kinds
+        left = 1.0 + 0.5 * PRIOR + self.allowed * sum([c.heard for c in kinds])
+        claims, bits = (self.probability, self.allowed), self._bits(who)
+        for share, heard in sorted([(c.sure(claims, bits), c.heard) for c in kinds], reverse=True):
+            if share <= self.probability:
+                break
+            left -= (1.0 - share) * heard
+            if left < 0.0:
+                return math.nextafter(share, 2.0)
+        return 0.0
+
+    def _bits(self, who: int) -> float:
+        return self._vouched if who < 0 else 0.0
+
+    def vouch(self, bits: float) -> None:
+        """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""
+        self._vouched = bits
+        self._changed()
+
+    # ------------------------------------------------------------------ how it came out
+    def look_back(
+        self,
+        audit: Audit,
+        came: float,
+        *,
+        claimed: bool,
+        rounding: float,
+        error: float,
+        turn: float = 0.0,
+        times: int = 0,
+        stands: int = 0,
+        misled: bool = False,
+    ) -> None:
+        """Take in how a prediction came out.
+
+        Parameters
+        ----------
+        audit
+            What was said.
+        came
+            What came.
+        claimed
+            Whether the prediction was a claim.
+        rounding
+            Errors up to this aren't told from none.
+        error
+            Largest error of a hit, as a share of what mostly changes (`ModelConfig.claim_error`).
+        turn
+            Length of a full turn, of an angle; 0 of anything else.
+        times
+            For how many predictions it stands that were confirmed (`confirm`); 0: it wasn't.
+        stands
+            For how many it stands that came out as such ones do (`thin`); 0: it stands for itself alone.
+        misled
+            Whether what it read was predicted wrongly: that says nothing of what it makes of it. Who was claimed all
+            the same is claimed again once he was right a few times.
+        """
+        errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
+        errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
+        self.trials += not times
+        self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
+        within = max(rounding, error * self.change)
+        if errors[audit.speaker] > within:  # which its law explains; those it would stand for were hits
+            times = 0
+        many = max(times, 1)
+        if many > 1:
+            self._changes = _counted(self._changes, _place(errors[PERSISTENCE]), many - 1)
+        self._slips[0] += max(many, stands)
+        self._slips[1] += max(stands, 1) * (claimed and errors[audit.speaker] > within)
+        if self._slips[0] > MEMORY:
+            self._slips = [0.5 * each for each in self._slips]
+            for cell in self._cells.values():
+                cell.heard *= 0.5
+        known = len(self._cells)
+        if not misled:
+            self._tally(audit, errors, within, rounding, times, stands)
+        elif claimed:
+            self._pause(audit.key)
+        self._changed(cells=len(self._cells) > known)
+
+    def _tally(
+        self, audit: Audit, errors: Sequence[float], within: float, rounding: float, times: int, stands: int
+    ) -> None:
+        """Count how a prediction came out in its cells; arguments as of `look_back`."""
+        many = max(times, 1)
+        for key in _levels(audit.key) if audit.key.winner else (audit.key,):
+            if key not in self._cells:
+                self._cells[key] = _Cell.new(audit.speaker, self.experts)
+            cell = self._cells[key]
+            if key.lead == OF_FAMILY:
+                cell.note(audit.speaker, errors, within, many)
+            else:
+                cell.count(errors, within, many)
+            if cell.since is not None:
+                cell.since = cell.since + many if errors[OWN] <= within else 0
+                if cell.credit(0.5, self._bits(_who(key))) > self.probability:
+                    cell.since = None
+        self._cells[audit.key].heard += max(many, stands)
+        if not (times or stands) and errors[audit.speaker] > rounding:
+            for key in _levels(audit.key)[1:]:
+                self._cells[key].steady = 0
+
+    def confirm(self, key: Key, share: float, draw: float) -> int:
+        """Take note that a prediction came true; how many such ones it stands for, 0 if another one will for it.
+
+        What comes true teaches little, and the less the longer all of its kind did. After r of them in a row half of
+        one in r is expected to fail (Jeffreys' prior). Where that is so many times less than `share`, one of as many
+        will do.
+
+        Parameters
+        ----------
+        key
+            Its kind.
+        share
+            `ModelConfig.downsampling`.
+        draw
+            A random number from 0 to 1, one for all predictions of a step: where one is learned from, those of which
+            more are needed are, too, and of most steps none is. Drawn, not counted off: things take turns, and none is
+            to be left out.
+        """
+        self.trials += 1
+        cell = self._cells.get(key)
+        if cell is None:
+            return 1
+        cell.steady += 1
+        if draw * int(2.0 * share * cell.steady) > 1.0:
+            cell.passed += 1
+            return 0
+        weight, cell.passed = cell.passed + 1, 0
+        return weight
+
+    def thin(self, key: Key, draw: float, *, held: bool) -> int:
+        """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
+
+        The more of a winner there are, the less one more tells: `MEMORY` of them tell what it leaves to 2 %.
+        So of n, one of n / `MEMORY` is learned from: of each twice as many, as many again. Kinds of few trials are
+        learned from in any case. Where intervals hold less often than they are to, by `EVIDENCE` bits, the world isn't
+        what it was, and all is learned from (cumulative sums: Page 1954; the alternative is that four to five times as
+        many lie outside).
+
+        Parameters
+        ----------
+        key
+            Its kind.
+        draw
+            As of `confirm`.
+        held
+            Whether what came lay in its interval.
+        """
+        kind = self._cells.get(key)
+        cell = self._cells.get(_winner(key)) if key.winner else kind
+        if cell is None or kind is None:
+            return 1
+        cell.steady += 1
+        missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
+        likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
+        cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
+        if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
+            cell.steady -= cell.steady // FEW
+        left_out = draw * (cell.steady // MEMORY) > 1.0
+        if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
+            self.trials += 1
+            kind.passed += 1
+            return 0
+        weight, kind.passed = kind.passed + 1, 0
+        return weight
+
+    def stood_still(self, outcome: int, count: int) -> None:
+        """What nobody predicted stayed as it was, so many times: that nothing changes was right."""
+        times = min(count, MEMORY)
+        cell = self._cells.setdefault(Key(outcome, 0, 0), _Cell.new(PERSISTENCE, self.experts))
+        record = cell.records.setdefault(PERSISTENCE, _Record())
+        record.add(True, times, fitted=False)
+        record.errors = _counted(record.errors, _EXACT, times)
+        cell.squares[PERSISTENCE][0] += times
+        cell.heard += times
+        self.trials += count
+        self._changed()
+
+    def revise(self, modes: Collection[int]) -> None:
+        """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more."""
+        for key, cell in self._cells.items():
+            own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
+            if own is not None and own.hits < own.trials:
+                cell.records[OWN] = _Record(revised=own.revised + 1)
+                cell.squares[OWN] = [0.0, 0.0, 0.0]
+                cell._sure = None
+        self._changed()
+
+    def _pause(self, key: Key) -> None:
+        """What was claimed read what was wrong: what it reads may go on so, so it isn't claimed for a while."""
+        for each in {key, _winner(key)} & self._cells.keys():
+            self._cells[each].since = self._cells[each].steady = 0  # all of what follows is looked at
+
+    def keep(self, modes: Collection[int]) -> None:
+        """Forget the records of modes that are gone; those of laws stay."""
+        self._cells = {
+            k: c for k, c in self._cells.items() if k.winner <= 0 or k.lead <= OF_FAMILY or k.winner in modes
+        }
+        self._changed()
+
+    def renewed(self, expert: int) -> None:
+        """An expert has another law: it begins as if it had been as good as who speaks in the latest few trials.
+
+        Of the first trials alone chance would tell. With `EVIDENCE` of them to begin with, an exact law speaks after as
+        many again.
+        """
+        for cell in self._cells.values():
+            known = cell.squares[cell.speaker]
+            share = min(1.0, EVIDENCE / known[0]) if known[0] else 0.0
+            cell.squares[expert] = [share * each for each in known]
+            cell._sure = None
+        self._changed()
+
+    def speakers(self) -> dict[int, float]:
+        """Trials of the cells in which each expert gives the value, by place of the expert."""
+        found: dict[int, float] = {}
+        for key, cell in sorted(self._cells.items()):
+            if key.lead >= 0:
+                speaker = self._assess(key, tuple(range(self.experts))).speaker
+                found[speaker] = found.get(speaker, 0.0) + cell.squares[PERSISTENCE][0]
+        return found
+
+    def doubts(self, outcome: int) -> bool:
+        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
+        if not self.share(outcome) >= 1.0 - self.allowed:
+            return _family(Key(outcome, 1, 0)) in self._cells
+        return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
+
+    def failing(self, key: Key) -> bool:
+        """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended."""
+        cell = self._cells.get(_winner(key))
+        own = None if cell is None else cell.records.get(OWN)
+        if own is None or 2.0 * own.hits >= own.trials:
+            return False
+        counts = (own.hits, own.trials - own.hits)
+        coded = sum(-n * math.log2(n / own.trials) for n in counts if n)
+        return own.trials - coded >= EVIDENCE
+
+    def forget(self) -> None:
+        """What follows is another model's word: only what mostly changes stays, and what the others know."""
+        whole = self._whole()
+        for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
+            whole.drop(expert)
+        self._cells, self._vouched = {_WHOLE: whole} if self._cells else {}, 0.0
+        self._changed()
+
+    def share(self, outcome: int) -> float:
+        """Share of what modes predicted with an outcome that were hits lately; NaN where there were none."""
+        whole = self._cells.get(_family(Key(outcome, 1, 0)))
+        own = None if whole is None else whole.records.get(OWN)
+        return math.nan if own is None or not own.trials else own.hits / own.trials
+
+    def paused(self, outcome: int) -> bool:
+        """Whether some kind isn't claimed, for what it reads was predicted wrongly."""
+        return any(
+            c.since is not None for k, c in self._cells.items() if k.outcome == outcome and k.lead >= 0
+        )
+
+    def kinds(self, outcome: int) -> Iterator[tuple[Key, float, Assessment]]:
+        """Each kind of predictions of an outcome, its trials, and what is made of such a prediction."""
+        for key, cell in sorted(self._cells.items()):
+            if key.outcome == outcome and key.lead >= 0:
+                yield key, cell.heard, self._assess(key, tuple(range(self.experts)))
+
+    def united(self, other: Calibration) -> Calibration:
+        """What two models know together: cell by cell, the record of who looked back more often."""
+        more, less = (self, other) if self.trials >= other.trials else (other, self)
+        others = self.allowed, self.experts - len(EXPERTS)
+        found = Calibration.from_json(more.to_json(), self.probability, *others)
+        for key, cell in Calibration.from_json(less.to_json(), self.probability, *others)._cells.items():
+            found._cells.setdefault(key, cell)
+        for cell in found._cells.values():  # a number stands for another mode here, maybe
+            cell.steady, cell.passed, cell.doubt = 0, 0, 0.0
+        found.trials = self.trials + other.trials
+        return found
+
+    # ------------------------------------------------------------------ saving
+    def to_json(self) -> dict[str, Any]:
+        """Plain data that `from_json` reads back."""
+        return {
+            "trials": self.trials,
+            "slips": list(self._slips),
+            "vouched": self._vouched,
+            "changes": [[place, count] for place, count in sorted(self._changes.items())],
+            "cells": [
+                {
+                    "key": list(key),
+                    "speaker": cell.speaker,
+                    "heard": cell.heard,
+                    "steady": cell.steady,
+                    "passed": cell.passed,
+                    **({"doubt": cell.doubt} if cell.doubt else {}),
+                    **({} if cell.since is None else {"since": cell.since}),
+                    "records": [
+                        [
+                            who,
+                            r.trials,
+                            r.hits,
+                            r.run,
+                            [[k, n] for k, n in sorted(r.errors.items())],
+                            [*r.runs, float(r.revised)] if r.revised else r.runs[: 6 if r.runs[5] else 4],
+                        ]
+                        for who, r in sorted(cell.records.items())
+                    ],
+                    "squares": [list(sums) for sums in cell.squares],
+                }
+                for key, cell in sorted(self._cells.items())
+            ],
+        }
+
+    @classmethod
+    def from_json(
+        cls, data: Mapping[str, Any], probability: float, slips: float = 0.0075, hypotheses: int = 0
+    ) -> Calibration:
+        """Read what `to_json` wrote."""
+        found = cls(probability, slips, hypotheses)
+        found.trials = int(data["trials"])
+        found._slips = [float(each) for each in data["slips"]]
+        found._vouched = float(data["vouched"])
+        found._changes = {int(place): float(count) for place, count in data["changes"]}
+        for each in data["cells"]:
+            records = {
+                int(who): _Record(
+                    float(n),
+                    float(hits),
+                    int(run),
+                    {int(k): float(c) for k, c in bins},
+                    [*map(float, runs), 0.0, 0.0][:6],
+                    int(next(iter(runs[6:]), 0)),
+                )
+                for who, n, hits, run, bins, runs in each["records"]
+            }
+            squares = [[float(s) for s in sums] for sums in each["squares"]]
+            found._cells[Key(*map(int, each["key"]))] = _Cell(
+                int(each["speaker"]),
+                records,
+                squares,
+                float(each["heard"]),
+                int(each["steady"]),
+                int(each["passed"]),
+                float(each.get("doubt", 0.0)),
+                None if (since := each.get("since")) is None else int(since),
+            )
+        return found
+
+
+def _able(values: Sequence[float]) -> tuple[int, ...]:
+    """Places of the experts that have a value."""
+    return _places(tuple(map(math.isfinite, values)))
+
+
+@cache
+def _places(held: tuple[bool, ...]) -> tuple[int, ...]:
+    """Where something holds; kept, for there are few such patterns and many predictions."""
+    return tuple(k for k, holds in enumerate(held) if holds)
+
+
+def _makes_claims(speaker: int) -> bool:
+    """Whether an expert is a mode, a law, or a law of a hypothesis class that was added; others have values only."""
+    return speaker not in _VALUES
+
+
+def _who(key: Key) -> int:
+    """Who makes a prediction: laws (-1), modes (1), or neither (0)."""
+    return (key.winner > 0) - (key.winner < 0)
+
+
+def _family(key: Key) -> Key:
+    """The cell of all predictions of one outcome that laws, or modes, make."""
+    return Key(key.outcome, _who(key), OF_FAMILY)
+
+
+def _winner(key: Key) -> Key:
+    """The cell of all predictions of one outcome and winner."""
+    return Key(key.outcome, key.winner, OF_WINNER)
+
+
+_WHOLE: Final = Key(0, 0, OF_ALL)
+"""What was known before the model was another one."""
+
+
+def _levels(key: Key) -> tuple[Key, Key, Key]:
+    """The cells that a prediction is counted in, the widest first; where nobody won they are one."""
+    return (_family(key), _winner(key), key) if key.winner else (key, key, key)
+
+
+def _mean(cell: _Cell | None, expert: int, prior: float = 0.5) -> float:
+    """Posterior mean of an expert's hits in a cell; the prior where there is none.
+
+    Who makes no claims and never spoke there is right as often as those like him who did, if he leaves no more than any
+    of them; else no more often.
+    """
+    if cell is None:
+        return prior
+    if (record := cell.records.get(expert)) is not None:
+        return record.mean(prior)
+    others = {} if _makes_claims(expert) else {k: r for k, r in cell.records.items() if not _makes_claims(k)}
+    if cell.squares[expert][0] and all(cell.left(expert) <= cell.left(other) for other in others):
+        known = others.values()
+        return _Record(sum(r.trials for r in known), sum(r.hits for r in known)).mean(prior)
+    return min([prior, *(other.mean(prior) for other in others.values())])
+
+
+def _place(error: float) -> int:
+    """The bin of an error's size."""
+    if error <= 0.0:
+        return _EXACT
+    return math.ceil(OCTAVE * math.log2(min(error, SUMMABLE)))
+
+
+def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, float]:
+    """Bins with so many more in one of them; of many the older ones count less."""
+    bins[place] = bins.get(place, 0.0) + times
+    if sum(bins.values()) <= MEMORY:
+        return bins
+    return {k: 0.5 * v for k, v in bins.items() if v > 2.0**-10}
+
+
+def _quantile(bins: Mapping[int, float], share: float, exact: float = 0.0) -> float:
+    """What a share of the sizes, and of one more, are no larger than; 0 where there are none.
+
+    Of the sizes that are no larger than rounding so many are left aside: all, if any.
+    """
+    wanted, seen = share * (sum(bins.values()) - exact + 1.0), -exact
+    for place in sorted(bins):
+        before, seen = seen, seen + bins[place]
+        if seen >= wanted:
+            if place == _EXACT:
+                return 0.0
+            # Within a bin, sizes are taken to be spread evenly over its part of an octave.
+            return float(2.0 ** ((place - 1 + (wanted - before) / bins[place]) / OCTAVE))
+    return 2.0 ** (max(bins) / OCTAVE) if bins else 0.0

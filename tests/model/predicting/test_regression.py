@@ -1,0 +1,237 @@
+"""Regressions on everything: which columns, how far they go, and what of them is kept."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from points import schema_of, transitions
+
+from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.regression import FIRST, Regression, _unpacked
+from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
+
+SCHEMA = schema_of(("x", "y"), ("a",))
+SIGNATURE = WorldModel(SCHEMA)._parts.signature_of(("self", "action"))
+
+
+def taught(n: int, most: int = 320, seed: int = 0) -> Regression:
+    """Of a change by a product, and of one by a sum."""
+    rng = np.random.default_rng(seed)
+    found = Regression(most)
+    for row in rng.normal(size=(n, len(SIGNATURE.columns))):
+        x, y, a = (row[SIGNATURE.column(*key)] for key in ((0, "x"), (0, "y"), (1, "a")))
+        found.learn_one(SIGNATURE, row, {"x": x * a, "y": y + 2.0 * a})
+    return found
+
+
+def said_of(found: Regression, rows: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Changes that regressions predict of some rows."""
+    told = found.values(SIGNATURE, rows)
+    return None if told is None else told.changes
+
+
+def test_distances_are_about_one_of_what_was_learned_and_grow_with_the_square() -> None:
+    found = taught(400)
+    told = found.values(SIGNATURE, np.random.default_rng(0).normal(size=(400, len(SIGNATURE.columns))))
+    assert told is not None
+    assert told.distances.mean() == pytest.approx(
+        1.0 + 1.0 / 3.0, rel=0.1
+    )  # of three columns, and their constant
+    far = found.values(SIGNATURE, np.outer([0.0, 10.0, 100.0, 1e200], np.ones(len(SIGNATURE.columns))))
+    assert far is not None
+    midst, near, further, out = far.distances
+    assert midst == pytest.approx(1.0 / 3.0, rel=0.1)
+    assert further / near == pytest.approx(100.0, rel=0.05)
+    assert np.isposinf(out)
+
+
+def test_sums_are_linear_and_products_are_not() -> None:
+    found = taught(400)
+    rows = np.random.default_rng(9).normal(size=(50, len(SIGNATURE.columns)))
+    x, y, a = (rows[:, SIGNATURE.column(*key)] for key in ((0, "x"), (0, "y"), (1, "a")))
+    said = said_of(found, rows)
+    assert said is not None
+    assert found.targets == ["x", "y"]
+    np.testing.assert_allclose(said[:, :, 1], np.stack([y + 2.0 * a] * 2, axis=1), atol=0.05)
+    assert np.abs(said[:, 1, 0] - x * a).max() < 0.1
+    assert np.abs(said[:, 0, 0] - x * a).max() > 0.5
+
+
+def test_nothing_is_said_before_there_are_enough_examples_and_of_too_many_columns() -> None:
+    rows = np.zeros((1, len(SIGNATURE.columns)))
+    assert said_of(taught(FIRST - 1), rows) is None
+    assert said_of(taught(FIRST), rows) is not None
+    assert said_of(taught(FIRST, most=2), rows) is None
+    linear = said_of(taught(FIRST, most=3), rows)
+    assert linear is not None
+    assert np.isfinite(linear[0]).all()
+    assert len(taught(FIRST, most=3)._ridges) == 1
+
+
+def test_products_count_as_far_as_their_leverage_allows() -> None:
+    found = taught(400)
+    here = np.random.default_rng(9).normal(size=(4, len(SIGNATURE.columns)))
+    rows = np.concatenate([here, 30.0 * here])
+    own, leverage = found._said(rows[:, found._columns(SIGNATURE)])
+    said = said_of(found, rows)
+    assert said is not None
+    assert (leverage[:4] < 0.3).all() and (leverage[4:, 1] > 10.0).all()
+    for target in (0, 1):
+        nothing, linear, products = found._left[:, target].tolist()
+        for k in range(8):
+            said_so_far, left = 0.0, nothing
+            for kind, s in enumerate((linear, products)):
+                bias, h = max(left - s, 0.0), leverage[k, kind]
+                ridge = found._ridges[kind]
+                share = bias / (bias + s * h * ridge.rows / ridge.columns) if bias else 0.0
+                said_so_far += share * (own[k, kind, target] - said_so_far)
+                left = min(left, s)
+            assert said[k, 1, target] == pytest.approx(said_so_far)
+    np.testing.assert_array_equal(said[:, 0], own[:, 0])
+
+
+def test_nothing_is_said_of_what_nothing_tells() -> None:
+    rng = np.random.default_rng(3)
+    found = Regression(320)
+    for row in rng.normal(size=(400, len(SIGNATURE.columns))):
+        found.learn_one(SIGNATURE, row, {"x": float(rng.normal())})
+    said = said_of(found, rng.normal(size=(50, len(SIGNATURE.columns))))
+    assert said is not None
+    assert np.square(said[:, 1]).mean() < 0.5 * np.square(said[:, 0]).mean()
+
+
+def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
+    found = taught(200)
+    said = said_of(found, np.full((1, len(SIGNATURE.columns)), 1e6))
+    assert said is not None
+    assert np.nanmax(np.abs(said)) < 20.0
+
+
+def test_what_was_saved_says_and_learns_the_same() -> None:
+    for n in (10, 150):
+        found, again = taught(n), Regression(320)
+        data = json.loads(json.dumps(found.to_json(history=True)))
+        again.restore(data, found.to_arrays())
+        more = np.random.default_rng(5).normal(size=(80, len(SIGNATURE.columns)))
+        for row in more:
+            for each in (found, again):
+                each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
+        one, other = said_of(found, more), said_of(again, more)
+        assert one is not None
+        assert other is not None
+        assert one.tobytes() == other.tobytes()
+
+
+def test_what_no_law_explains_is_predicted_by_them_and_not_claimed() -> None:
+    def step(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [float(np.tanh(s[0] * u[0]) + 0.3 * s[1]), float(s[1])]
+
+    rng = np.random.default_rng(3)
+
+    def some(n: int) -> list[Transition]:
+        return transitions(SCHEMA, step, rng.normal(size=(n, 2)), rng.normal(size=(n, 1)))
+
+    model = WorldModel(SCHEMA)
+    for transition in some(500):
+        compare_and_learn(model, transition, model.predict_one(transition.before))
+    fresh = some(100)
+    parts = [model.predict_one(t.before)["self", "x"] for t in fresh]
+    came = np.array([t.after["self"]["x"] for t in fresh])
+    now = np.array([t.before["self"]["x"] for t in fresh])
+    error = np.sqrt(np.square([p.value for p in parts] - came).mean())
+    assert not any(p.ok for p in parts)
+    assert error < 0.5 * np.sqrt(np.square(now - came).mean())
+    inside = np.mean([abs(p.value - y) <= p.interval for p, y in zip(parts, came, strict=True)])
+    assert inside > 0.85
+
+
+@pytest.mark.parametrize("wild", [1e30, 1e140, 1e155, 1e200, 1.7e308, -1.7e308])
+def test_of_a_gross_error_nothing_is_said_or_what_was_seen(wild: float) -> None:
+    """No number beyond what changes were, no overflow, and no other row's values change for it."""
+    found, rng = taught(150), np.random.default_rng(7)
+    calm = rng.normal(size=(12, len(SIGNATURE.columns)))
+    before = said_of(found, calm)
+    least, most = found._range
+    slack = 0.5 * (most - least)
+    for column in range(len(SIGNATURE.columns)):
+        rows = calm.copy()
+        rows[5, column] = wild
+        said = said_of(found, rows)
+        assert before is not None and said is not None
+        told = said[5][~np.isnan(said[5])]
+        assert ((told >= np.min(least - slack)) & (told <= np.max(most + slack))).all()
+        others = np.arange(12) != 5
+        assert said[others].tobytes() == before[others].tobytes()
+
+
+@pytest.mark.parametrize("wild", [1e155, 1e300])
+def test_a_gross_error_that_is_learned_leaves_what_is_known_as_it_is(wild: float) -> None:
+    """Its squares would be infinite, and so would be what is summed from then on."""
+    hit, calm = taught(150), taught(150)
+    rows = np.random.default_rng(7).normal(size=(100, len(SIGNATURE.columns)))
+    for k, row in enumerate(rows):
+        if k == 3:
+            hit.learn_one(SIGNATURE, np.full(len(row), wild), {"x": 0.0, "y": 0.0})
+        for each in (hit, calm):
+            each.learn_one(SIGNATURE, row, {"x": row[0], "y": row[1]})
+    said = [said_of(each, rows) for each in (hit, calm)]
+    assert said[0] is not None and said[1] is not None
+    assert said[0].tobytes() == said[1].tobytes()
+    assert all(np.isfinite(array).all() for array in hit.to_arrays().values())
+
+
+@given(st.integers(FIRST, 130), st.integers(0, 2**32 - 1))
+def test_sums_say_what_values_say(n: int, seed: int) -> None:
+    """Columns, centres, scales, weights and bounds are all that kernels read."""
+    found = taught(n, seed=seed % 7)
+    rows = 3.0 * np.random.default_rng(seed).normal(size=(4, len(SIGNATURE.columns)))
+    said, leverage = found._said(rows[:, found._columns(SIGNATURE)])
+    looked = found.fit(SIGNATURE)
+    assert looked is not None
+    places, centre, scale, reach = looked
+    for ridge, (mean, spread) in zip(found._ridges, reach, strict=True):
+        assert list(mean) == ridge.mean.tolist()
+        assert _unpacked(spread, len(mean)).tobytes() == ridge.spread.tobytes()
+    for k, target in enumerate(found.targets):
+        told = found.sums(target)
+        assert told is not None
+        weights, (least, most) = told
+        for kind, (bias, more, few) in enumerate(found.trusted[k].tolist()):
+            assert few == 1.0 / found._ridges[kind].rows
+            share = bias / (bias + more * leverage[:, kind]) if bias else np.zeros(4)
+            np.testing.assert_allclose(found._share(kind, leverage[:, kind])[:, k], share)
+        for row, expected in zip(rows, said, strict=True):
+            z = [(row[p] - c) / s for p, c, s in zip(places, centre, scale, strict=True)]
+            products = [a * b for i, a in enumerate(z) for b in z[i:]]
+            for kind, columns in enumerate(([1.0, *z], [1.0, *z, *products])):
+                value = sum(w * c for w, c in zip(weights[kind], columns, strict=True))
+                assert min(max(value, least), most) == pytest.approx(expected[kind, k], rel=1e-9, abs=1e-9)
+
+
+def test_bounds_are_half_a_range_beyond_what_was_seen() -> None:
+    found = taught(100)
+    least, most = found._range[:, 1]
+    told = found.sums("y")
+    assert told is not None
+    assert told[1] == pytest.approx((1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
+    far = np.zeros((2, len(SIGNATURE.columns)))
+    far[:, SIGNATURE.column(0, "y")] = -1e3, 1e3
+    said = said_of(found, far)
+    assert said is not None
+    assert said[:, 0, 1].tolist() == list(told[1])
+
+
+def test_of_other_columns_nothing_is_said() -> None:
+    other = WorldModel(schema_of(("x",), ("a",)))._parts.signature_of(("self", "action"))
+    found = taught(100)
+    assert found.values(other, np.zeros((1, len(other.columns)))) is None
+    assert found.fit(other) is None and found.sums("z") is None
+    seen = found.seen
+    found.learn_one(other, np.zeros(len(other.columns)), {"x": 1.0})
+    assert found.seen == seen
