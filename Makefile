@@ -123,7 +123,7 @@ $(VENV)-highway/.installed: pyproject.toml
 $(VENV)-ocatari/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)-ocatari
 	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check 'ocatari==2.2.1' 'ale-py==0.12.1' \
-		'gymnasium>=1.2,<2' python-fcl scipy rich typer
+		'gymnasium>=1.2,<2' llvmlite msgspec python-fcl scipy rich typer
 	$(VENV)-ocatari/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 

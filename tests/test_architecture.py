@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -151,6 +152,21 @@ def test_the_core_knows_no_world_by_name() -> None:
         if node.value in WORLD_WORDS
     ]
     assert not wrong, "the core may not test an object's, type's or property's name\n" + "\n".join(wrong)
+
+
+def test_adapters_with_pins_of_their_own_get_the_libraries_that_models_need() -> None:
+    # numpy comes with the emulator; the ball's engine isn't asked for.
+    every = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    needed = {re.split(r"[<>=~!]", each)[0] for each in every}
+    _, _, rest = (
+        (ROOT / "Makefile").read_text(encoding="utf-8").partition("$(VENV)-ocatari/.installed: pyproject")
+    )
+    rule = rest.partition("\n\n")[0]
+    assert "--no-deps" in rule
+    missing = {
+        name for name in needed - {"numpy", "pymunk"} if not re.search(rf"[ ']{re.escape(name)}\b", rule)
+    }
+    assert not missing, f"add to what example-ocatari installs: {sorted(missing)}"
 
 
 def test_every_package_on_disk_is_installed() -> None:

@@ -421,7 +421,9 @@ def main(suite: Suite, arguments: Sequence[str]) -> None:
     parser.add_argument("--page", type=Path, help="also write the page of results there")
     parser.add_argument("--report", action="store_true", help="run nothing, tell what is known")
     parser.add_argument(
-        "--again", action="store_true", help="run what is known, too: times are another machine's"
+        "--again",
+        action="store_true",
+        help="run what is known once more, too: times are those of the machine and the hour they were taken",
     )
     given = parser.parse_args(arguments)
     out = given.out or Path("out", suite.name)

@@ -5,7 +5,7 @@ Results are kept as all others are, and were measured on the machine that kept t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 from relgym.errors import ConfigError
@@ -101,14 +101,14 @@ def _rolls(extent: Extent, known: Known) -> Shown:
     return Shown((), [table(["million steps a second", "engine", "one core", "card"], rows)])
 
 
-def _of_worlds(title: str, known_worlds: Sequence[str], measure: Benchmark) -> Benchmark:
-    """The same benchmark, which refuses worlds that it hasn't."""
+def _of(worlds: Sequence[str], title: str, measure: Callable[[Extent, Known], Shown]) -> Benchmark:
+    """A benchmark of some worlds, which refuses others."""
 
     def checked(extent: Extent, known: Known) -> Shown:
         for world in extent["worlds"]:
-            if world not in known_worlds:
-                raise ConfigError(f"{title} of {world!r}: expected one of {', '.join(known_worlds)}")
-        return measure.measure(extent, known)
+            if world not in worlds:
+                raise ConfigError(f"world {world!r}: expected one of {', '.join(worlds)}")
+        return measure(extent, known)
 
     return Benchmark(title, checked)
 
@@ -118,8 +118,8 @@ SUITE: Final = Suite(
     "Time and memory",
     {
         "steps": Benchmark("A step of learning, ms of processor time", _steps),
-        "sizes": _of_worlds("Sizes", list(sizes.WORLDS), Benchmark("", _sizes)),
-        "rolls": _of_worlds("Roll-outs", WORLDS, Benchmark("", _rolls)),
+        "sizes": _of(list(sizes.WORLDS), "Sizes of worlds", _sizes),
+        "rolls": _of(WORLDS, "Roll-outs, on one core and on a card", _rolls),
     },
     seeds=1,
     options={
