@@ -103,7 +103,7 @@ def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -
         for m in measures
     ]
     header = ["figure", "limit", "worst", "median", "of", ""]
-    return "\n".join([title, table(header, rows), *notes])
+    return "\n".join([title, *([table(header, rows)] if rows else []), *notes])
 
 
 def one_of(names: Collection[str]) -> Callable[[str], str]:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from relgym.cli import app
 from relgym.errors import ConfigError, StoreError
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite, main, page, whole
-from relgym.experiments.criterion import measured
+from relgym.experiments.criterion import measured, report
 from relgym.experiments.jobs.store import ResultStore
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.suites import SUITES, suite
@@ -113,6 +113,10 @@ def test_a_page_keeps_what_was_made_elsewhere_and_what_was_written_by_hand(tmp_p
     (tmp_path / "whole" / "whole.json").write_text("{")
     with pytest.raises(StoreError, match=r"whole\.json is damaged"):
         page(SUITE, tmp_path / "whole", target)
+
+
+def test_where_nothing_has_a_limit_there_is_no_empty_table() -> None:
+    assert report("Title", [], ["A note."]) == "Title\nA note."
 
 
 def test_mistakes_are_told(capsys: pytest.CaptureFixture[str]) -> None:
