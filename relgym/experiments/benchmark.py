@@ -73,7 +73,7 @@ class Option:
             parser.add_argument(f"--{name}", action="store_true", help=self.about)
             return
         several = isinstance(self.default, tuple)
-        kind = str if several or self.default is None else type(self.default)
+        kind = str if several else type(self.default)
         parser.add_argument(
             f"--{name}",
             type=one_of(self.choices) if self.choices else kind,
@@ -140,6 +140,11 @@ class Known:
         kind = function.partition(":")[2]
         found = self.of([Task(function, each, kind) for each in arguments])
         return [(task.arguments, value) for task, value in found]
+
+    def whole(self, function: str, arguments: Mapping[str, Any]) -> Shown:
+        """What a function tells of a whole benchmark (`Shown.to_json`); nothing as long as that isn't known."""
+        found = self(function, [arguments])
+        return Shown.from_json(found[0]) if found else Shown()
 
     def of(
         self, tasks: Sequence[Task], wanted: Callable[[Task], bool] = lambda task: True
@@ -218,8 +223,7 @@ def whole(title: str, function: str, arguments: Mapping[str, Any], seeds: Sequen
     """
 
     def measure(extent: Extent, known: Known) -> Shown:
-        found = known(function, [{**arguments, "seeds": list(extent.first(seeds))}])
-        return Shown.from_json(found[0]) if found else Shown()
+        return known.whole(function, {**arguments, "seeds": list(extent.first(seeds))})
 
     return Benchmark(title, measure)
 

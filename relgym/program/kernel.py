@@ -1724,7 +1724,7 @@ def consult(s, a, k, value):
 
 
 def settled(s, a, k, value, outcome, mode, margin, able):
-    """Value, outcome and mode, once it is known how right such predictions were (`running.runner`)."""
+    """Value, outcome and mode, once it is known how right such predictions were, as `querying.settled`."""
     trust = s.code[a + 25]
     winner = -mode if s.code[trust + 4] else mode
     kind = np.int64(PREDICTED if mode else outcome)

@@ -41,7 +41,7 @@ from relgym.experiments.any_env.flight import flight
 from relgym.experiments.any_env.memory import LIVES, memory
 from relgym.experiments.any_env.stream import prequential
 from relgym.experiments.any_env.tables import RECORDED
-from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite, whole
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
@@ -241,7 +241,9 @@ def _benchmark(name: str) -> Benchmark:
             folder = extent["recordings"]
             asked |= _recorded(name, folder)
             pairs = [pair for pair in pairs if Path(folder, f"{name}-{pair[0]}.npz").is_file()]
-        return whole("", "relgym.experiments.any_env.suite:part", asked, pairs).measure(extent, known)
+        return known.whole(
+            "relgym.experiments.any_env.suite:part", {**asked, "seeds": list(extent.first(pairs))}
+        )
 
     return Benchmark(_TITLES[name], measure)
 

@@ -16,17 +16,7 @@ import numpy as np
 import relgym  # noqa: F401 - registers the envs
 from relgym.wrappers import ModelLearner
 
-__all__ = ["HOME", "STRANGERS", "StepTimes", "step_times", "trial"]
-
-STRANGERS: Final = (
-    "InvertedPendulum-v5",
-    "Reacher-v5",
-    "HalfCheetah-v5",
-    "Ant-v5",
-    "BipedalWalker-v3",
-    "LunarLander-v3",
-)
-"""Worlds that the learner wasn't made for."""
+__all__ = ["HOME", "StepTimes", "step_times", "trial"]
 
 HOME: Final = ("relgym/BallBoxRamp-v0", "relgym/TruckPush-v0", "CartPole-v1")
 

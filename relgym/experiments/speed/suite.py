@@ -15,6 +15,7 @@ from relgym.experiments.dyna.speed import WORLDS
 from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.experiments.speed import sizes as sizes
 from relgym.experiments.speed import steps as step_times
+from relgym.experiments.strangers.suite import NAMED
 from relgym.model.reports.text import Cell, table
 
 __all__ = ["SUITE"]
@@ -65,7 +66,7 @@ def _sizes(extent: Extent, known: Known) -> Shown:
 
 
 def _steps(extent: Extent, known: Known) -> Shown:
-    worlds = _chosen(extent, [*step_times.HOME, *step_times.STRANGERS]) or extent["worlds"]
+    worlds = extent["worlds"] or [*step_times.HOME, *NAMED]
     asked = [
         {"world": world, "steps": extent["steps"], "seed": seed}
         for world in worlds

@@ -11,7 +11,7 @@ fresh episodes. Envs ending in ``-v5`` need the extra ``bench-envs``. What is me
   ten bins of the probability (Naeini et al. 2015), of all targets together;
 - *coverage*: the share of next values inside the 95 % interval stated;
 - with ``--advised``: the same with the features that are advised, learned from the same steps, and *against library
-  ridge* and *against PySINDy* on the same columns (`relgym.experiments.strangers.library`);
+  ridge* and *against PySINDy* on the same columns (`relgym.experiments.strangers.baselines`);
 - processor time per step, mean and largest. What is loaded once in a process, the kernel, is loaded before, and
   what Python's garbage collector does with all that was there before isn't counted: it is the same for any program.
 """
@@ -34,7 +34,7 @@ from relgym.experiments.any_env.data import Study, stream
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.criterion import measured
 from relgym.experiments.seeds import TRAINING_SEEDS
-from relgym.experiments.strangers.library import BASELINES, predicted, ridge, short
+from relgym.experiments.strangers.baselines import BASELINES, predicted, ridge, short
 from relgym.experiments.strangers.made import MADE, TEXTBOOK
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import OUTCOMES, Outcome

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite, whole
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.experiments.worlds.accuracy import AXES, Outcome, accuracy, ball_measures
@@ -155,8 +155,8 @@ def part(*, name: str, seeds: Sequence[int], tuning: bool) -> dict[str, Any]:
 def _benchmark(name: str) -> Benchmark:
     def measure(extent: Extent, known: Known) -> Shown:
         seeds = TUNING_SEEDS if extent["tuning"] else TRAINING_SEEDS
-        asked = {"name": name, "tuning": extent["tuning"]}
-        return whole("", "relgym.experiments.worlds.suite:part", asked, seeds).measure(extent, known)
+        asked = {"name": name, "tuning": extent["tuning"], "seeds": list(extent.first(seeds))}
+        return known.whole("relgym.experiments.worlds.suite:part", asked)
 
     return Benchmark(_PARTS[name][0], measure)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from points import learned, schema_of, transitions
 
-from relgym.experiments.strangers.library import predicted, ridge, sparse
+from relgym.experiments.strangers.baselines import predicted, ridge, sparse
 from relgym.scene.objects import Transition
 
 SCHEMA = schema_of(("x", "v"), ("a",))
