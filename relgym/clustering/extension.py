@@ -131,7 +131,8 @@ def _extended(
             continue
         told = _told(known, signature, int(order[at])) if flags[at] else None
         leads = range(len(both) - 1, max(len(both) - 1 - fresh, len(members) - 1), -1)
-        tried = (_agreeing(x[:, at], left, len(members), k, tolerance, told) for k in leads)
+        off = x[:, at] - float(np.median(x[: len(members), at]))
+        tried = (_agreeing(off, left, len(members), k, tolerance, told) for k in leads)
         agree = next((rows for rows in tried if rows is not None), None)
         if agree is None:
             continue
@@ -161,7 +162,7 @@ def _told(known: Known, signature: int, column: int) -> list[float]:
 
 
 def _agreeing(
-    column: NDArray[np.float64],
+    off: NDArray[np.float64],
     left: NDArray[np.float64],
     members: int,
     lead: int,
@@ -172,13 +173,12 @@ def _agreeing(
 
     Parameters
     ----------
-    column, left
-        Values of the column, and what the mode leaves, in its `members` examples and then in the unexplained ones.
+    off, left
+        How far a column is from what is usual in the mode's `members` examples, and what the mode leaves: in those, and
+        then in the unexplained ones.
     told
         Of a flag: weights that it has in other modes. None of any other column.
     """
-    usual = float(np.median(column[:members]))
-    off = column - usual
     start = float(off[lead])
     if start == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(start):
         return None

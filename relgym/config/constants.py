@@ -9,6 +9,7 @@ from typing import Final
 
 __all__ = [
     "BEYOND",
+    "CACHED",
     "CONTACTS_KEPT",
     "DIGITS",
     "EVIDENCE",
@@ -105,6 +106,9 @@ DIGITS: Final = 7
 
 FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
+
+CACHED: Final = 1 << 14
+"""Numbers that are worked on at once where more would be, 128 kB: with what is made of them they fit a core's cache."""
 
 MORE_ROOM: Final = 0.125
 """Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all."""

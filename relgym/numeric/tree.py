@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import CACHED
 from relgym.errors import ConfigError
 from relgym.scheduling.work import CALL, Steps, resumable
 
@@ -241,42 +242,55 @@ class _Grower:
     def _best_split(self, rows: NDArray[np.intp]) -> tuple[tuple[float, float, int, float] | None, int]:
         """(entropy, -relative gap, column, threshold) of the best split, and how many cuts were tried."""
         best: tuple[float, float, int, float] | None = None
-        cuts = 0
-        for column in range(self.x.shape[1]):
-            entropies, gaps, thresholds = self._cuts(rows, column)
-            cuts += len(entropies)
-            if not len(entropies):
-                continue
-            near = np.flatnonzero(entropies <= entropies.min() + _TIE)
-            pick = near[np.argmax(gaps[near])]
-            entropy, gap = float(entropies[pick]), float(gaps[pick])
-            closer = best is None or entropy < best[0] - _TIE
-            if closer or (best is not None and entropy <= best[0] + _TIE and -gap < best[1]):
-                best = entropy, -gap, column, float(thresholds[pick])
+        cuts, width = 0, max(1, CACHED // len(rows))
+        for first in range(0, self.x.shape[1], width):
+            entropies, gaps, thresholds, counts = self._cuts(rows, slice(first, first + width))
+            cuts += int(counts.sum())
+            for k in np.flatnonzero(counts).tolist():
+                among = entropies[k]
+                near = np.flatnonzero(among <= among.min() + _TIE)
+                pick = near[np.argmax(gaps[k, near])]
+                entropy, gap = float(among[pick]), float(gaps[k, pick])
+                closer = best is None or entropy < best[0] - _TIE
+                if closer or (best is not None and entropy <= best[0] + _TIE and -gap < best[1]):
+                    best = entropy, -gap, first + k, float(thresholds[k, pick])
         return best, cuts
 
-    def _cuts(self, rows: NDArray[np.intp], column: int) -> tuple[_Float1D, _Float1D, _Float1D]:
-        """Entropy after, relative gap and threshold of every admissible cut of one column."""
-        values = self.x[rows, column]
-        order = np.argsort(values, kind="stable")  # NaN last: undefined values lie above every cut
-        values, weights = values[order], self.weights[rows][order]
+    def _cuts(
+        self, rows: NDArray[np.intp], columns: slice
+    ) -> tuple[_Float2D, _Float2D, _Float2D, NDArray[np.intp]]:
+        """Of each column, between every two rows by value: entropy after, relative gap and threshold of a cut there.
+
+        Entropy is infinite where there may be none. And how many there may be.
+        """
+        n = len(rows)
+        values = np.ascontiguousarray(self.x[rows, columns].T)
+        order = np.argsort(values, axis=1, kind="stable")  # NaN last: undefined values lie above every cut
+        values = np.take_along_axis(values, order, axis=1)
+        weights = self.weights[rows][order]
         hits = np.where(self.positive[rows][order], weights, 0.0)
-        finite = int(np.isfinite(values).sum())
-        last = np.arange(self.min_leaf - 1, min(finite, len(rows) - self.min_leaf + 1) - 1)
-        same = _ROUNDING * float(np.abs(values[:finite]).max(initial=0.0))
-        last = last[values[last + 1] - values[last] > same] if len(last) else last
-        if 0 < finite < len(rows) and finite >= self.min_leaf and len(rows) - finite >= self.min_leaf:
-            last = np.append(last, finite - 1)  # "is it defined at all?"
-        if not len(last):
-            return np.empty(0), np.empty(0), np.empty(0)
-        below, hit = np.cumsum(weights)[last], np.cumsum(hits)[last]
+        finite = np.isfinite(values).sum(axis=1, keepdims=True)
+        lower, higher, place = values[:, :-1], values[:, 1:], np.arange(n - 1)
+        with np.errstate(invalid="ignore"):  # what isn't finite is cut off below
+            step = higher - lower
+            known = np.where(np.arange(n) < finite, np.abs(values), 0.0)
+            same = _ROUNDING * known.max(axis=1, keepdims=True)
+            may = (step > same) & (place >= self.min_leaf - 1) & (place < n - self.min_leaf)
+            may &= place < finite - 1
+            # "Is it defined at all?"
+            some = (finite > 0) & (finite < n) & (finite >= self.min_leaf) & (n - finite >= self.min_leaf)
+            may |= some & (place == finite - 1)
+            upper = np.where(place + 1 < finite, higher, lower)
+            span = np.take_along_axis(values, np.maximum(finite - 1, 0), axis=1) - values[:, :1]
+            middle = lower + (upper - lower) / 2
+            # Rounding must not move the midpoint onto the upper value, or the test would change sides.
+            thresholds = np.where(middle < upper, middle, lower)
+            gaps = (upper - lower) / np.where(span != 0.0, span, 1.0)
+        below, hit = np.cumsum(weights, axis=1)[:, :-1], np.cumsum(hits, axis=1)[:, :-1]
+        every, all_hits = weights.sum(axis=1, keepdims=True), hits.sum(axis=1, keepdims=True)
         after = _entropy(hit, below - hit)
-        after += _entropy(hits.sum() - hit, (weights.sum() - below) - (hits.sum() - hit))
-        upper = np.where(last + 1 < finite, values[np.minimum(last + 1, len(rows) - 1)], values[last])
-        span = float(values[finite - 1] - values[0]) or 1.0
-        middle = values[last] + (upper - values[last]) / 2
-        # Rounding must not move the midpoint onto the upper value, or the test would change sides.
-        return after, (upper - values[last]) / span, np.where(middle < upper, middle, values[last])
+        after += _entropy(all_hits - hit, (every - below) - (all_hits - hit))
+        return np.where(may, after, np.inf), gaps, thresholds, may.sum(axis=1)
 
 
 def _entropy(positive: _Float1D, negative: _Float1D) -> _Float1D:

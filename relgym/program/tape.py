@@ -7,6 +7,7 @@ numbers; where it holds others, it names where those begin (0: there is none). `
 from __future__ import annotations
 
 import math
+from array import array
 from base64 import b64decode
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -244,14 +245,9 @@ def encoded(program: ir.Program) -> Tape:
 class _Writer:
     def __init__(self, program: ir.Program) -> None:
         self.program = program
-        self.code: list[int] = [0] * HEADER
-        self.numbers: list[float] = [
-            program.turn,
-            program.touch,
-            program.part,
-            program.precision,
-            0.0 if program.motion is None else program.motion.slack,
-        ]
+        self.code = array("q", [0] * HEADER)
+        slack = 0.0 if program.motion is None else program.motion.slack
+        self.numbers = array("d", [program.turn, program.touch, program.part, program.precision, slack])
         self.roles = 1
         self.variables = 1
         self.reads: set[int] = set()
@@ -264,7 +260,7 @@ class _Writer:
 
     def put(self, *values: int) -> int:
         """Append whole numbers; where they begin."""
-        self.code.extend(int(v) for v in values)
+        self.code.extend(values)
         return len(self.code) - len(values)
 
     def col(self, *columns: int) -> list[int]:
@@ -274,7 +270,7 @@ class _Writer:
 
     def num(self, *values: float) -> int:
         """Append numbers; where they begin."""
-        self.numbers.extend(float(v) for v in values)
+        self.numbers.extend(values)
         return len(self.numbers) - len(values)
 
     def tape(self) -> Tape:
@@ -599,7 +595,8 @@ class _Writer:
             entries = np.frombuffer(b64decode(one.spread), dtype="<f4").astype(np.float64)
             first, second = np.triu_indices(width)
             doubled = np.where(first == second, entries, 2.0 * entries)
-            reach.append(self.num(*one.mean, *doubled.tolist()))
+            reach.append(self.num(*one.mean))
+            self.numbers.frombytes(doubled.tobytes())
             self.spreads[one] = reach[-1]
         return self.put(d, columns, at, len(reach), *reach)
 
