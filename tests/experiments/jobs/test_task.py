@@ -49,7 +49,12 @@ def test_only_plain_data() -> None:
 
 def test_the_version_covers_what_is_imported_and_nothing_else() -> None:
     behind = modules_behind("relgym.numeric.tree")
-    assert behind == ("relgym.errors", "relgym.numeric.tree", "relgym.scheduling.work")
+    assert behind == (
+        "relgym.config.constants",
+        "relgym.errors",
+        "relgym.numeric.tree",
+        "relgym.scheduling.work",
+    )
     learner = modules_behind("relgym.experiments.worlds.online")
     assert {"relgym.numeric.tree", "relgym.model.world_model", "relgym.laws.pair"} <= set(learner)
     assert not {"relgym.cli", "relgym.experiments.plots"} & set(learner)
