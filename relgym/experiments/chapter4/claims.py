@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from statistics import fmean
+from statistics import fmean, median
 from typing import Any, Final, TypeAlias
 
 from relgym.experiments.chapter4 import frequencies, plans
@@ -247,29 +247,27 @@ def _share(experiment: int, axis: str, *rows: int) -> Measure:
 
 
 def _pushed(learner: str) -> Measure:
-    """How many rows of Table 3.1 were learned, less modes that are none and examples of noise."""
+    """How many rows of Table 3.1 were learned, less modes that are none and examples of noise; median of the seeds."""
 
-    def measure(values: Values) -> float:
-        run = values[f"pushing/{learner}"][0]
+    def of_run(run: Mapping[str, Any]) -> float:
         stated = list(run["stated"].values())
         return float(len({s for s in stated if s >= 0}) - sum(s < 0 for s in stated) - run["noise"])
 
-    return measure
+    return lambda values: median(of_run(run) for run in values[f"pushing/{learner}"])
 
 
 def _pushed_pairs(learner: str) -> Measure:
-    """Least training accuracy of a pair of modes, in percent."""
+    """Least training accuracy of a pair of modes, in percent; median of the seeds."""
 
-    def measure(values: Values) -> float:
-        targets = values[f"pushing/{learner}"][0]["report"]["targets"]
-        target = next(t for t in targets if t["target"] == "truck.vx")
+    def of_run(run: Mapping[str, Any]) -> float:
+        target = next(t for t in run["report"]["targets"] if t["target"] == "truck.vx")
         least = 100.0
         for pair in target["pairs"]:
             good, bad = (sum(r[k] for r in pair["rows"]) for k in ("correct", "incorrect"))
             least = min(least, 100.0 * good / max(1, good + bad))
         return least
 
-    return measure
+    return lambda values: median(of_run(run) for run in values[f"pushing/{learner}"])
 
 
 def _stated(group: str, number: str, axis: str, *rows: int) -> Measure:
@@ -378,7 +376,7 @@ CLAIMS: Final = (
         _pushed_pairs("thesis"),
         (100, 100),
         (99, 100),
-        "the literal that filters out most negatives keeps few positives (Algorithm 2); FOIL's gain finds Table 3.2",
+        "what filters out most negatives may keep few positives (Algorithm 2), in two of sixteen seeds too few",
     ),
     Claim("4.3", "x: share of sliding and flying, %", "97.3", _share(1, "x", 1), (94, 99), (90, 100)),
     Claim("4.3", "y: share of flying and sliding, %", "97.0", _share(1, "y", 1, 2), (94, 99), (90, 100)),

@@ -42,14 +42,11 @@ def nothing(_: Protocol) -> Plan:
 
 
 def pushing(protocol: Protocol) -> Plan:
-    """Box pushing, every learner once."""
+    """Box pushing, every learner, every training seed; tables show the first."""
     return {
         learner: [
-            Task(
-                f"{_ROOM}.pushing:lesson",
-                {"learner": learner, "seed": TRAINING_SEEDS[0]},
-                without=_without(learner),
-            )
+            Task(f"{_ROOM}.pushing:lesson", {"learner": learner, "seed": seed}, without=_without(learner))
+            for seed in TRAINING_SEEDS
         ]
         for learner in LEARNERS
     }
