@@ -269,8 +269,9 @@ def _again(
                 for case in mode.cases
             }
             kinds = here if kinds is None else kinds & here
-    if kinds and "slide" in kinds:  # a ball that lies on something; after a bounce it rises instead
-        kinds |= set() if surfaces[hits[-1]] == "slide" else {"level"}
+    if kinds and "slide" in kinds:
+        # Where a ball doesn't rise or fall a level bounce says the same as sliding: what it did last tells them apart.
+        kinds = kinds - {"level", "slide"} | {"slide" if surfaces[hits[-1]] == "slide" else "level"}
     return next((kind for kind in _AFTERWARDS if kind in (kinds or ())), "")
 
 
