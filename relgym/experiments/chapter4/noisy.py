@@ -30,8 +30,8 @@ def lesson(
     Parameters
     ----------
     expected
-        Variance that the learner of chapter III expects, in squared units; ``"auto"``: the same learner of ours, which
-        estimates it; ``"default"``: relgym as it comes.
+        Variance that the thesis' program expects, in squared units: chapter IV's experiments are the program's;
+        ``"auto"``: modes of ours along the world's axes, which estimate it; ``"default"``: relgym as it comes.
     true
         Variance of the noise.
     seed, order, episodes, tests
@@ -54,4 +54,4 @@ def lesson(
 def _settings(expected: float | str) -> ThesisSettings | ModelConfig:
     if isinstance(expected, str):
         return settings_of({"auto": "world"}.get(expected, expected))
-    return ThesisSettings.thesis(noise_variance=expected)
+    return ThesisSettings.original(noise_variance=expected)
