@@ -784,7 +784,6 @@ CLAIMS: Final = (
         _occurred("original", "delayed falling"),
         (3, 14),
         (1, 21),
-        "in 80 trials of our scenes three balls slide off an edge; the others bounce off it",
     ),
     Claim(
         "4.5",
