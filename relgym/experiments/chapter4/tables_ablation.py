@@ -26,6 +26,7 @@ def ablation_shown(_: Protocol, values: Values) -> Shown:
         "ties too %",
         "printed range %",
         "inside",
+        "upright %",
         "most of it",
     ]
     lines: list[list[Cell]] = []
@@ -39,9 +40,17 @@ def ablation_shown(_: Protocol, values: Values) -> Shown:
             inside = "yes" if low <= shares[0] <= high else "no"
             percents = [f"{100 * share:.3f}" for share in shares]
             bounds = f"{100 * low:g}-{100 * high:g}"
-            lines.append([experiment, target, learner, *percents, bounds, inside, _worst(parts)])
+            upright = _wrong(parts, "left face", "right face")
+            lines.append([experiment, target, learner, *percents, bounds, inside, upright, _worst(parts)])
     lines.sort(key=lambda line: (line[0], line[1]))
     return Shown(f"{table(heading, lines)}\n\n{_NOTE}\n{_causes()}", [heading, *lines])
+
+
+def _wrong(parts: Sequence[Mapping[str, Any]], *names: str) -> str:
+    """Share of wrong predictions, in percent, among the examples of true modes whose names begin so."""
+    modes = [mode for part in parts for mode in part["modes"] if mode["name"].startswith(names)]
+    examples = sum(mode["examples"] for mode in modes)
+    return f"{100 * sum(mode['wrong'] for mode in modes) / examples:.1f}" if examples else "-"
 
 
 def _worst(parts: Sequence[Mapping[str, Any]]) -> str:
@@ -58,7 +67,8 @@ def _worst(parts: Sequence[Mapping[str, Any]]) -> str:
 
 _NOTE: Final = (
     "On all 24,000 test examples, whatever the protocol. wrong: off by more than 1e-9, or no prediction. strict: the "
-    "chosen mode isn't\nthe best one, ties forgiven; ties too: not forgiven, as the thesis counted."
+    "chosen mode isn't\nthe best one, ties forgiven; ties too: not forgiven, as the thesis counted. upright: wrong "
+    "of the bounces off\nupright surfaces."
 )
 
 
