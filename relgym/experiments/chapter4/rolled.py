@@ -134,7 +134,8 @@ def _most_accurate(
         if len(batches) == 1:
             return model, [seed, order]
         scores = scores_of(model, fresh, laws).values()
-        wrong = float(sum(score["counted"]["strict"] for score in scores))
+        # Where laws predict there are no modes to be confused: what is wrong counts.
+        wrong = float(sum(s["counted"].get("strict", s["counted"]["wrong"]) for s in scores))
         if best is None or wrong < best[0]:
             best = wrong, model, [seed, order]
     assert best is not None, "there is at least one batch"

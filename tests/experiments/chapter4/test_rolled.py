@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from relgym.experiments.chapter4.rolled import cause_of, trial_episodes
+from relgym.experiments.chapter4.rolled import cause_of, imagine, trial_episodes
 from relgym.experiments.episodes import Episode
 
 
@@ -44,3 +44,18 @@ def test_a_ball_that_rises_and_is_said_to_bounce_again_was_badly_resolved(trials
     for episode, k in found:
         vx, vy = episode.columns("ball", "vx", "vy")[k]
         assert cause_of(episode, k, 1, np.array([vx, -0.9 * vy])) == "bad collision resolution, level surface"
+
+
+@pytest.mark.parametrize("learner", ["original", "default"])
+def test_the_most_accurate_of_several_models_imagines(learner: str) -> None:
+    found = imagine(
+        learner=learner,
+        experiment=1,
+        batches=[[900, 0], [901, 1]],
+        episodes=3,
+        chosen_on={"seeds": [902], "episodes": 2},
+        tests=[903],
+        trials=2,
+    )
+    assert found["batch"] in ([900, 0], [901, 1])
+    assert len(found["trials"]) == 2
