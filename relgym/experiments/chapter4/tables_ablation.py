@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import ABLATIONS, Protocol
 from relgym.experiments.chapter4.published import RATES
 from relgym.experiments.chapter4.scores import pooled_scores
+from relgym.experiments.chapter4.tables_errors import wrong_of_modes
 from relgym.model.reports.text import Cell, table
 
 __all__ = ["ablation_shown"]
@@ -40,17 +42,11 @@ def ablation_shown(_: Protocol, values: Values) -> Shown:
             inside = "yes" if low <= shares[0] <= high else "no"
             percents = [f"{100 * share:.3f}" for share in shares]
             bounds = f"{100 * low:g}-{100 * high:g}"
-            upright = _wrong(parts, "left face", "right face")
+            share = wrong_of_modes(parts, "left face", "right face")
+            upright = "-" if math.isnan(share) else f"{share:.1f}"
             lines.append([experiment, target, learner, *percents, bounds, inside, upright, _worst(parts)])
     lines.sort(key=lambda line: (line[0], line[1]))
     return Shown(f"{table(heading, lines)}\n\n{_NOTE}\n{_causes()}", [heading, *lines])
-
-
-def _wrong(parts: Sequence[Mapping[str, Any]], *names: str) -> str:
-    """Share of wrong predictions, in percent, among the examples of true modes whose names begin so."""
-    modes = [mode for part in parts for mode in part["modes"] if mode["name"].startswith(names)]
-    examples = sum(mode["examples"] for mode in modes)
-    return f"{100 * sum(mode['wrong'] for mode in modes) / examples:.1f}" if examples else "-"
 
 
 def _worst(parts: Sequence[Mapping[str, Any]]) -> str:

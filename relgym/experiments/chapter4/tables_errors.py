@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -15,7 +16,7 @@ from relgym.experiments.chapter4.tables_modes import best_run, row_of
 from relgym.experiments.rollouts import STRAY
 from relgym.model.reports.text import Cell, table
 
-__all__ = ["confusion_shown", "rates_shown", "rollouts_shown"]
+__all__ = ["confusion_shown", "rates_shown", "rollouts_shown", "wrong_of_modes"]
 
 _TARGETS: Final[Mapping[str, tuple[str, str]]] = {
     "4.7": ("4.2", "x"),
@@ -23,6 +24,21 @@ _TARGETS: Final[Mapping[str, tuple[str, str]]] = {
     "4.15": ("4.9", "x"),
     "4.16": ("4.9", "y"),
 }
+
+
+def wrong_of_modes(scores: Sequence[Mapping[str, Any]], *names: str) -> float:
+    """Share of wrong predictions, in percent, among the examples of true modes whose names begin so; NaN of none.
+
+    Parameters
+    ----------
+    scores
+        Of one target, from any number of trainings.
+    names
+        Such as ``"floor"``.
+    """
+    modes = [mode for score in scores for mode in score["modes"] if mode["name"].startswith(names)]
+    examples = sum(mode["examples"] for mode in modes)
+    return 100.0 * float(sum(mode["wrong"] for mode in modes)) / examples if examples else math.nan
 
 
 def confusion_shown(_: Protocol, values: Values, number: str) -> Shown:
