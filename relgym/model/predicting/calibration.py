@@ -1119,12 +1119,15 @@ def _quantile(bins: Mapping[int, float], share: float, exact: float = 0.0) -> fl
 
     Of the sizes that are no larger than rounding so many are left aside: all, if any.
     """
-    wanted, seen = share * (sum(bins.values()) - exact + 1.0), -exact
-    for place in sorted(bins):
-        before, seen = seen, seen + bins[place]
-        if seen >= wanted:
-            if place == _EXACT:
-                return 0.0
-            # Within a bin, sizes are taken to be spread evenly over its part of an octave.
-            return float(2.0 ** ((place - 1 + (wanted - before) / bins[place]) / OCTAVE))
-    return 2.0 ** (max(bins) / OCTAVE) if bins else 0.0
+    below = sum(bins.values()) - exact
+    wanted = share * (below + 1.0)
+    if below < wanted:
+        return 2.0 ** (max(bins) / OCTAVE) if bins else 0.0
+    for place in sorted(bins, reverse=True):  # shares are large, and counts are added without rounding
+        below -= bins[place]
+        if below < wanted:
+            break
+    if place == _EXACT:
+        return 0.0
+    # Within a bin, sizes are taken to be spread evenly over its part of an octave.
+    return float(2.0 ** ((place - 1 + (wanted - below) / bins[place]) / OCTAVE))
