@@ -23,7 +23,14 @@ from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.scores import pooled_scores, quantile
 from relgym.model.reports.text import Cell, table
 
-__all__ = ["accuracy_shown", "by_mode_shown", "perfect_shown", "rates_shown", "scores_by_episodes"]
+__all__ = [
+    "accuracy_shown",
+    "by_mode_shown",
+    "perfect_shown",
+    "pooled_as_told",
+    "rates_shown",
+    "scores_by_episodes",
+]
 
 _QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 _Score: TypeAlias = Mapping[str, Any]
@@ -33,12 +40,12 @@ def scores_by_episodes(runs: Sequence[Any], target: str, part: str = "all") -> d
     """Pooled scores of all batches by number of training episodes; `part` is ``"all"`` or ``"counted"``."""
     numbers = [each["episodes"] for each in runs[0]["scores"]]
     return {
-        episodes: _pooled([run["scores"][k]["targets"][target][part] for run in runs])
+        episodes: pooled_as_told([run["scores"][k]["targets"][target][part] for run in runs])
         for k, episodes in enumerate(numbers)
     }
 
 
-def _pooled(scores: Sequence[_Score]) -> _Score:
+def pooled_as_told(scores: Sequence[_Score]) -> dict[str, Any]:
     """Pooled scores, as far as all batches tell: after few episodes some have modes, where others' laws have none."""
     told = set.intersection(*map(set, scores))
     return pooled_scores([{key: each[key] for key in scores[0] if key in told} for each in scores])
@@ -145,7 +152,7 @@ def _by_mode(runs: Sequence[Any], target: str) -> dict[str, dict[int, _Score]]:
             for score in each["targets"][target]["modes"]:
                 found.setdefault(score["name"], {}).setdefault(each["episodes"], []).append(score)
     return {
-        name: {episodes: _pooled(scores) for episodes, scores in by_episodes.items()}
+        name: {episodes: pooled_as_told(scores) for episodes, scores in by_episodes.items()}
         for name, by_episodes in found.items()
     }
 

@@ -10,9 +10,10 @@ from typing import Any, Final
 from relgym.baselines.catalogue import REGRESSORS
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.chapter4.canvas import TITLES, first_case
+from relgym.experiments.chapter4.figures_accuracy import pooled_as_told
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
-from relgym.experiments.chapter4.scores import pooled_scores, quantile
+from relgym.experiments.chapter4.scores import quantile
 from relgym.model.reports.text import Cell, table
 
 __all__ = ["headline_shown", "tuning_shown"]
@@ -101,7 +102,7 @@ def _pooled_modes(parts: Sequence[Any]) -> list[dict[str, Any]]:
     for part in parts:
         for score in part["modes"]:
             modes.setdefault(score["name"], []).append(score)
-    return [pooled_scores(scores) for scores in modes.values()]
+    return [pooled_as_told(scores) for scores in modes.values()]
 
 
 _NOTE: Final = (
@@ -129,7 +130,7 @@ def _measures(runs: Sequence[Any], target: str) -> dict[int, list[float]]:
     found = {}
     for k, each in enumerate(runs[0]["scores"]):
         parts = [run["scores"][k]["targets"][target] for run in runs]
-        every = pooled_scores(part["all"] for part in parts)
+        every = pooled_as_told([part["all"] for part in parts])
         medians = [quantile(mode["errors"], 0.5) for mode in _pooled_modes(parts)]
         quantiles = [quantile(every["errors"], q) for q in (0.5, 0.95, 0.999)]
         found[each["episodes"]] = [*quantiles, every["sum"] / every["examples"], mean(medians)]

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from relgym.experiments.chapter4.canvas import PRINTED, TITLES
+from relgym.experiments.chapter4.figures_accuracy import pooled_as_told
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
 from relgym.experiments.chapter4.published import CONFUSIONS, MODES, RATES, ROLLOUT_FAILURES, Confusion
 from relgym.experiments.chapter4.rolled import CAUSES, STRAYS, occurrences
-from relgym.experiments.chapter4.scores import pooled_scores, quantile
+from relgym.experiments.chapter4.scores import quantile
 from relgym.experiments.chapter4.tables_modes import best_run, row_of
 from relgym.experiments.rollouts import STRAY
 from relgym.model.reports.text import Cell, table
@@ -157,7 +158,7 @@ def rates_shown(_: Protocol, values: Values) -> Shown:
     for group, runs in values.items():
         experiment, learner = group.split("/")
         for target in ("ball.vx", "ball.vy"):
-            score = pooled_scores(run["scores"][-1]["targets"][target]["counted"] for run in runs)
+            score = pooled_as_told([run["scores"][-1]["targets"][target]["counted"] for run in runs])
             low, high = RATES[int(experiment), target]
             lines.append(
                 [int(experiment), target, TITLES[learner], *_shares(score), f"{100 * low:g}-{100 * high:g}"]
