@@ -354,8 +354,7 @@ class Parts:
         return frozenset(
             (target.type, target.property)
             for target, read in self.models.items()
-            if (target.type, target.property) in needs
-            and (self.governs(target) or not read.fallback.guessable)
+            if (target.type, target.property) in needs and (self.governs(target) or not read.fallback.lawless)
         )
 
     def regressed(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:

@@ -1807,6 +1807,9 @@ def step(s, settling, telling):
             s.touched[k] = 0
             if math.isfinite(value):
                 s.touched[k] = -2 if beyond(s, a) else -1
+            elif s.code[a + 26]:  # nobody knows who is right: least squares speak
+                regress(s, s.code[a + 26], k)
+                value = s.experts[k, PRODUCTS]
         s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
         lost = outcome != PREDICTED
         if s.given[k]:

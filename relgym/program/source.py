@@ -96,7 +96,7 @@ class _Source:
             add(_SCENE)
         if trusts:
             add(_TRUST)
-        if p.fits and trusts:
+        if p.fits:
             add(_REGRESSION)
         if p.casts or votes:
             add(_VOTES)
@@ -537,6 +537,20 @@ class _Source:
         return f"not ({text})" if each.negated else f"({text})"
 
     # ------------------------------------------------------------------ who is believed
+    def _squares(self) -> None:
+        """What least squares say of each answer."""
+        add = self.lines.append
+        if not self.program.fits:
+            return
+        add("# ---- least squares: columns with centre and scale, and what leverage is worked out from")
+        for number, fit in enumerate(self.program.fits):
+            self._fit(number, fit)
+        told = [
+            self._regression(self._called(number), a.regression) if a.regression is not None else "None"
+            for number, a in enumerate(self.program.answers)
+        ]
+        add("SQUARES = (  # of each answer below\n" + "".join(f"    {each},\n" for each in told) + ")\n")
+
     def _trust(self) -> None:
         """How right predictions of each kind were; of all objects of a type alike."""
         add, known, told = self.lines.append, list[tuple[ir.Belief, ...]](), list[str]()
@@ -550,12 +564,6 @@ class _Source:
         )
         add("# whose values there are (bits of EXPERTS): who speaks, and how sure that is")
         add(f"EXPERTS = {ir.EXPERTS!r}")
-        if self.program.fits:
-            add(
-                "# what least squares look at: columns with centre and scale; what leverage is worked out from"
-            )
-        for number, fit in enumerate(self.program.fits):
-            self._fit(number, fit)
         for number, a in enumerate(self.program.answers):
             trust = a.trust
             if trust is None:
@@ -570,13 +578,12 @@ class _Source:
                 add("}")
             name = self._called(number)
             latest = f"({trust.latest}, {name}_mode_{trust.latest})" if trust.latest else "None"
-            squares = self._regression(name, a.regression) if a.regression is not None else "None"
             kind = f"{trust.lawful}, {trust.distant}, {trust.rests!r}"
-            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind}, {latest}, {squares})")
+            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind}, {latest})")
         add(
             "# beliefs; whether of laws, and by how far a scene lies from what was learned; keys that modes rely on;"
         )
-        add("# the mode that held last; regressions; of each answer below")
+        add("# the mode that held last; of each answer below")
         add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
 
     def _fit(self, number: int, fit: ir.Fit) -> None:
@@ -602,6 +609,7 @@ class _Source:
     # ------------------------------------------------------------------ the step
     def _step(self, answers: list[str]) -> None:
         p, add = self.program, self.lines.append
+        self._squares()
         self._trust()
         add("# ---- all of it, in causal order: what, its column, its (type, property), those it depends on")
         add("ANSWERS = (")
@@ -613,9 +621,13 @@ class _Source:
         angles = ", ".join(self.names[c] for c in p.angles)
         add(f"ANGLES = ({angles}{',' if angles else ''})\n")
         scene = "Scene(x)" if p.bodies else "None"
-        plain = "        value = value if finite else guess"
+        words = "regressed(x, SQUARES[number])" if p.fits else "(math.nan, math.nan, 0.0)"
+        plain = f"        value = value if finite else guess if math.isfinite(guess) else {words}[1]"
         if any(a.trust is not None for a in p.answers):
-            plain = "        value, outcome, mode, sure = settled(number, value, outcome, mode, margin, guess, x, odds)"
+            plain = (
+                f"        said = value, guess, *{words}\n"
+                "        value, outcome, mode, sure = settled(number, said, outcome, mode, margin, x, odds)"
+            )
         registers = str(p.registers - 2 * p.width)
         add(_STEP.replace("REGISTERS", registers).replace("SCENE", scene).replace("SETTLED", plain))
 
@@ -798,14 +810,15 @@ def situation(used, near, target, stands):
 '''
 
 _TRUST = '''
-def settled(number, value, outcome, mode, margin, guess, x, odds):
+def settled(number, said, outcome, mode, margin, x, odds):
     """Value, outcome and mode of a prediction, once it is known how right such ones were, and how sure that is."""
+    value, guess, linear, products, far = said
     if TRUST[number] is None:
-        return value if math.isfinite(value) else guess, outcome, mode, (math.nan, math.nan)
-    beliefs, lawful, distant, rests, latest, squares = TRUST[number]
+        known = next((each for each in (value, guess) if math.isfinite(each)), products)
+        return known, outcome, mode, (math.nan, math.nan)
+    beliefs, lawful, distant, rests, latest = TRUST[number]
     present = x[NEXT + ANSWERS[number][1]]
     last = latest[1](x) if latest else math.nan
-    linear, products, far = regressed(x, *squares) if squares else (math.nan, math.nan, 0.0)
     values = value, guess, linear, products, last, present
     able = sum(1 << k for k, each in enumerate(values[:5]) if math.isfinite(each))
     winner = -mode if lawful else mode
@@ -848,11 +861,14 @@ def in_order(terms):
     return float(np.add.accumulate(np.array(terms))[-1])
 
 
-def regressed(x, present, fit, weights, least, most, trusted):
+def regressed(x, squares):
     """The next value by least squares on some numbers, and what that and least squares on their products say together.
 
     Each counts as far as the leverage allows. And the squared distance from what was learned, 1 in the mean.
     """
+    if squares is None:
+        return math.nan, math.nan, 0.0
+    present, fit, weights, least, most, trusted = squares
     columns, reach = fit
     z = [(x[c] - centre) / scale for c, centre, scale in columns]
     both = z, z + [z[i] * z[j] for i in range(len(z)) for j in range(i, len(z))]

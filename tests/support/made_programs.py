@@ -122,11 +122,12 @@ def _step(p: ir.Program, now: Sequence[float]) -> tuple[list[float], list[tuple[
         value, outcome, mode, margin = _modes(a, x)
         value, outcome, mode, margin = _heard(value, outcome, mode, margin, depends=bool(lost & set(a.needs)))
         sure = math.nan, math.nan
+        words = _regressed(p, a.regression, x)
         if a.trust is None:
-            value = value if math.isfinite(value) else guess
+            value = next((each for each in (value, guess) if math.isfinite(each)), words[1])
         else:
             value, outcome, mode, sure = _trusted(
-                a, a.trust, x, p.width, (value, outcome, mode, margin, guess), _regressed(p, a.regression, x)
+                a, a.trust, x, p.width, (value, outcome, mode, margin, guess), words
             )
         if math.isfinite(value):
             x[p.width + a.column] = value

@@ -75,7 +75,7 @@ as least squares' part of the errors does, is taken for 1.5 c / n then; the vari
 _VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
 """Who makes no claims."""
 
-_BY_DEFAULT: Final = (OWN, GUESS, PERSISTENCE)
+_BY_DEFAULT: Final = (OWN, GUESS, PRODUCTS, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
 MEMORY: Final = 1024

@@ -130,7 +130,11 @@ class Explanation:
             yield from _labelled("laws", self.laws)
             return
         if not p.ok:
-            said = f"-> {p.value:.{d}g}, a guess" if p.informed else "keeps its value: no prediction"
+            said = (
+                f"-> {p.value:.{d}g}, a guess"
+                if p.informed or p.value != self.now
+                else "keeps its value: no prediction"
+            )
             yield f"{name}: {self.now:.{d}g} {said}"
             yield f"  outcome   {p.outcome.value}"
             yield from _labelled("lacks", self.lacks)

@@ -75,7 +75,7 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
         clusterer.approximate,
         model.surmise,
         model.rough,
-        known.guessable,
+        known.lawless,
     )
     if not votes:
         return

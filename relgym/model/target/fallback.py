@@ -28,6 +28,8 @@ class Fallback:
     ----------
     clusterer
         Knows the modes.
+    offered
+        Whether non-linear features are offered.
 
     Attributes
     ----------
@@ -39,8 +41,9 @@ class Fallback:
         Whether there is no law, as far as is known by now.
     """
 
-    def __init__(self, clusterer: ModeClusterer) -> None:
+    def __init__(self, clusterer: ModeClusterer, *, offered: bool) -> None:
         self.clusterer = clusterer
+        self.offered = offered
         self.guesses = Guesses()
         self.scope = EVERYWHERE
         self.unexplained = False
@@ -55,9 +58,14 @@ class Fallback:
         return known.scale.sigma > ROUGH * self.clusterer.floor and known.config.noise_std == "auto"
 
     @property
-    def guessable(self) -> bool:
+    def lawless(self) -> bool:
         """Whether nothing is explained, or nothing exactly."""
         return self.unexplained or self.inexact
+
+    @property
+    def guessable(self) -> bool:
+        """Whether guesses may stand in: features are offered, mostly more than regressions have room for."""
+        return self.lawless and self.offered
 
     @property
     def guess(self) -> Guess | None:

@@ -1,7 +1,8 @@
 """Guesses: sparse least squares over all examples, used as fallback values where no mode or law predicts.
 
-Where a property depends on something unobserved (a driver's intentions) no mode holds, and the fallback would be that
-it keeps its value: for a car's position that is far off. A guess is a sparse function of what the target and bodiless
+Where a property depends on something unobserved (a driver's intentions) no mode holds. What is linear in the numbers,
+and in few products of them, regressions tell (`relgym.model.predicting.regression`); of non-linear features that are
+offered there are mostly more than they have room for. A guess is a sparse function of what the target and bodiless
 objects have, features included, that predicts best what it wasn't fitted to. It has no modes and no conditions, and its
 outcome stays `UNEXPLAINED`. It replaces an approximation that errs more; and where approximations aren't used
 (`relgym.model.target.scope`), a guess fitted to the examples there is.

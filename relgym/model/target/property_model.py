@@ -115,7 +115,7 @@ class PropertyModel:
         self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classifying)
         self.casting = Casting(vocabulary, config.classification)
         self.functions = ModeFunctions(self.clusterer, self.casting, config)
-        self.fallback = Fallback(self.clusterer)
+        self.fallback = Fallback(self.clusterer, offered=_offered(config, target.type))
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
@@ -304,10 +304,10 @@ class PropertyModel:
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not any(t.has_body for t in self.schema.types)
-        bounded = self.fallback.guessable or (bodiless and self.clusterer.noise_examples >= LEAF)
+        bounded = self.fallback.lawless or (bodiless and self.clusterer.noise_examples >= LEAF)
         asked = self.config.abstain and bounded and len(self.clusterer.rows)
         self.fallback.scope = (
-            find_scope(self.clusterer, table, guessing=self.fallback.guessable) if asked else EVERYWHERE
+            find_scope(self.clusterer, table, guessing=self.fallback.lawless) if asked else EVERYWHERE
         )
 
     def start_over(self, table: ExampleTable) -> None:
@@ -540,7 +540,7 @@ class PropertyModel:
 
         So they may where nothing tells which mode holds, though half of what a record remembers came.
         """
-        if self._unsettled or self.fallback.guessable:
+        if self._unsettled or self.fallback.lawless:
             return True
         return self.undecided and 2 * self.calibration.trials >= MEMORY
 
@@ -802,6 +802,11 @@ class PropertyModel:
         self.amended = {int(mode) for mode in data.get("amended", ())}
         self.functions.bound.clear()
         self.fallback.bound.clear()
+
+
+def _offered(config: ModelConfig, type_name: str) -> bool:
+    """Whether non-linear features of a type are offered (`ModelConfig.features`)."""
+    return any(entry.rpartition(":")[0] in ("", type_name) for entry in config.features)
 
 
 def _noisy(labels: NDArray[np.int32]) -> float:

@@ -29,6 +29,7 @@ from relgym.model.predicting.calibration import (
     OF_WINNER,
     OWN,
     PERSISTENCE,
+    PRODUCTS,
     Assessment,
     Audit,
     Calibration,
@@ -702,6 +703,8 @@ def test_the_first_who_has_a_value_speaks_before_anything_is_known() -> None:
     assert known.assess(KEY, some).speaker == PERSISTENCE
     some[LINEAR], some[LATEST] = 1.0, 1.0
     assert known.assess(Key(1, 0, 0), some).speaker == PERSISTENCE
+    some[PRODUCTS] = 1.0
+    assert known.assess(Key(1, 0, 1), some).speaker == PRODUCTS
     some[GUESS] = 1.0
     assert known.assess(Key(2, 0, 0), some).speaker == GUESS
     some[OWN] = 1.0
