@@ -512,8 +512,13 @@ class PropertyModel:
 
     @property
     def asks_latest(self) -> bool:
-        """Whether the mode that held last is asked: not where the vote's winners are mostly right."""
+        """Whether the mode that held last is asked: not where the vote's winners are mostly right.
+
+        Nor where modes are approximations: of these it is the place that decides, and no law goes on until it changes.
+        """
         if len(self.classifier.modes) < 2 or self.latest not in self.clusterer.clusters:
+            return False
+        if self.fallback.inexact:
             return False
         return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
 

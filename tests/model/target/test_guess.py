@@ -10,6 +10,7 @@ import pytest
 from points import formulas, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.target.guess import MEMORY, Guesses, _terms
 from relgym.model.target.property_model import _offered
@@ -230,3 +231,23 @@ def test_a_guess_that_leads_anywhere_can_be_held_against_what_comes_later(off: f
     assert np.isfinite(guesses.errors).all() and guesses.errors[1, 0] > 1e280
     assert guesses.errors[0, 0] == pytest.approx(1e-6 * (1.0 - (1.0 - 1.0 / MEMORY) ** 3))
     assert not guesses.superior
+
+
+def test_of_approximations_that_which_held_last_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two laws, and nothing tells which of them holds: the one that held last may go on, if it is exact."""
+    rng = np.random.default_rng(0)
+    signs = np.repeat([1.0, -1.0], 20)[np.arange(400) % 40].tolist()
+    steps = transitions(
+        SCHEMA,
+        lambda s, u: [s[0], s[1] + signs.pop() * u[0]],
+        rng.normal(size=(400, 2)),
+        rng.normal(size=(400, 1)),
+    )
+    model = WorldModel(SCHEMA)
+    for step in steps:
+        compare_and_learn(model, step, model.predict_one(step.before))
+    part = model.property_model("self", "v")
+    assert len(part.modes) == 2 and not part.fallback.inexact
+    assert part.asks_latest
+    monkeypatch.setattr(part.clusterer.population, "approximate", True)
+    assert part.fallback.inexact and not part.asks_latest
