@@ -45,6 +45,15 @@ def test_cells_are_won_level_or_lost_and_every_loss_has_its_cause() -> None:
     assert losses.count("corners and contacts that no linear law explains") == 6
 
 
+def test_batches_of_which_only_some_have_modes_are_pooled() -> None:
+    """Of one batch it is known what the best mode leaves; another one's laws have no modes."""
+    mixed = [_run(0.5, 0.1, best=0.4), _run(0.0, 0.1)]
+    values = {"thesis": mixed, "default": mixed, "knn/thesis": [_run(0.01, 0.05)] * 2}
+    for some in (mixed, mixed[::-1]):
+        text = headline_shown(Protocol.fast(1), values | {"thesis": some}).text
+        assert "floor (left): 2 of 4 wrong" in text
+
+
 def test_nothing_lost_is_said() -> None:
     ours, theirs = [_run(0.0, 0.0, best=0.0)], [_run(0.1, 0.1)]
     shown = headline_shown(Protocol.fast(1), {"thesis": ours, "default": ours, "knn/thesis": theirs})
