@@ -358,12 +358,12 @@ class Parts:
         )
 
     def regressed(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
-        """Changes of a property that regressions predict for an object of n scenes, shape ``(n, kinds)``."""
+        """Changes of a property that regressions predict for an object of n scenes, shape ``(n,)``."""
         regression = self.regressions[percept.layout.types[index].name]
         if prop not in regression.targets:
             return None
         found = self._asked(regression, percept, index)
-        return None if found is None else found.changes[:, :, regression.targets.index(prop)]
+        return None if found is None else found.changes[:, regression.targets.index(prop)]
 
     def distance(self, percept: Percept, index: int, prop: str) -> NDArray[np.float64] | None:
         """How far n scenes of an object lie from what regressions of a property learned, shape ``(n,)``; None: no such.

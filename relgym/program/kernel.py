@@ -13,6 +13,7 @@ import math
 
 import numpy as np
 
+from relgym.program.records import LEAST_RATE, SAYS, WIDER
 from relgym.program.tape import (
     ANGLES,
     ANSWERS,
@@ -74,7 +75,7 @@ TURNED = 3
 NOT_FINITE = 4
 """A number is NaN or infinite: arrays say so."""
 
-OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(6)
+OWN, GUESS, REGRESSION, LATEST, PERSISTENCE = range(5)
 """Who gives a value (`relgym.program.records.EXPERTS`); what nobody does stays as it is."""
 
 FREE, TOUCHING = 1, 2
@@ -1693,15 +1694,16 @@ def regress(s, record, k):
         if kind == 0:
             linear = word
         if math.isfinite(word):
-            at = reach + 2 + 3 * kind
-            bias, growth, far = s.numbers[at], s.numbers[at + 1], s.leverage[kind] + s.numbers[at + 2]
-            more = growth * far if growth > 0.0 else 0.0
-            share = bias / (bias + more) if bias > 0.0 else 0.0
+            at = reach + 2 + (2 + SAYS) * kind
+            far = (s.leverage[kind] + s.numbers[at + 1]) * s.numbers[at]
+            share, rate = s.numbers[at + 2], LEAST_RATE
+            for j in range(1, SAYS):
+                share = share + s.numbers[at + 2 + j] / (1.0 + rate * far)
+                rate = WIDER * rate
             whole = whole + share * (word - whole)
-    midst = s.numbers[reach + 4]
+    midst = s.numbers[reach + 3]
     s.far[k] = far_bin((s.leverage[0] + midst) / min(1.0, s.code[fit] * midst))
-    s.experts[k, LINEAR] = present + linear
-    s.experts[k, PRODUCTS] = present + whole if math.isfinite(linear) else math.nan
+    s.experts[k, REGRESSION] = present + whole if math.isfinite(linear) else math.nan
 
 
 def consult(s, a, k, value):
@@ -1709,7 +1711,7 @@ def consult(s, a, k, value):
     said = s.experts[k]
     said[OWN] = value
     said[GUESS] = guessed(s, a) if s.code[a + 16] or s.code[a + 17] else math.nan
-    said[LINEAR] = said[PRODUCTS] = math.nan
+    said[REGRESSION] = math.nan
     s.far[k] = 0
     if s.code[a + 26]:
         regress(s, s.code[a + 26], k)
@@ -1731,14 +1733,14 @@ def settled(s, a, k, value, outcome, mode, margin, able):
     lead = s.far[k] if mode and s.code[trust + 5] else np.int64(0)
     if lead == 0:
         lead = np.int64(lead_of(margin))
-    number = ((winner * 16 + lead + 2) * 8 + kind) * 32 + able
+    number = ((winner * 16 + lead + 2) * 8 + kind) * 16 + able
     if s.believed[k, 0] != number:
         place = find(s, s.code[trust + 1], s.code[trust], number)
         if place < 0:  # all of the winner
-            place = find(s, s.code[trust + 1], s.code[trust], ((winner * 16 + 1) * 8 + kind) * 32 + able)
+            place = find(s, s.code[trust + 1], s.code[trust], ((winner * 16 + 1) * 8 + kind) * 16 + able)
         if place < 0:  # all that modes, or laws, or neither say
             who = np.int64(winner > 0) - np.int64(winner < 0)
-            place = find(s, s.code[trust + 1], s.code[trust], (who * 128 + kind) * 32 + able)
+            place = find(s, s.code[trust + 1], s.code[trust], (who * 128 + kind) * 16 + able)
         s.believed[k, 0], s.believed[k, 1] = number, place
     place = s.believed[k, 1]
     said, sure = s.code[trust + 2] + 2 * place, s.code[trust + 3] + 2 * place
@@ -1809,7 +1811,7 @@ def step(s, settling, telling):
                 s.touched[k] = -2 if beyond(s, a) else -1
             elif s.code[a + 26]:  # nobody knows who is right: least squares speak
                 regress(s, s.code[a + 26], k)
-                value = s.experts[k, PRODUCTS]
+                value = s.experts[k, REGRESSION]
         s.outcomes[k], s.modes[k], s.margins[k] = outcome, mode, margin
         lost = outcome != PREDICTED
         if s.given[k]:

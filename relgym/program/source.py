@@ -542,7 +542,13 @@ class _Source:
         add = self.lines.append
         if not self.program.fits:
             return
-        add("# ---- least squares: columns with centre and scale, and what leverage is worked out from")
+        add(
+            "# ---- least squares: columns with centre and scale, and what leverage is worked out from; then how far a"
+        )
+        add(
+            "# word counts: squared distance at a leverage of 1, leverage in the midst, and the say of each rate"
+        )
+        add(f"RATES = {ir.RATES!r}")
         for number, fit in enumerate(self.program.fits):
             self._fit(number, fit)
         told = [
@@ -600,7 +606,8 @@ class _Source:
         add(f"{name.upper()}_LEAST_SQUARES = (")
         weights = (f"({', '.join(map(_number, row))},)" for row in r.weights)
         trusted = (
-            f"({_number(each.bias)}, {_number(each.more)}, {_number(each.least)})" for each in r.trusted
+            f"({_number(each.growth)}, {_number(each.least)}, ({', '.join(map(_number, each.say))}))"
+            for each in r.trusted
         )
         add(f"    {self.names[r.present]}, FIT_{r.fit},\n    ({', '.join(weights)},),")
         add(f"    {_number(r.least)}, {_number(r.most)}, ({', '.join(trusted)},),\n)")
@@ -621,8 +628,8 @@ class _Source:
         angles = ", ".join(self.names[c] for c in p.angles)
         add(f"ANGLES = ({angles}{',' if angles else ''})\n")
         scene = "Scene(x)" if p.bodies else "None"
-        words = "regressed(x, SQUARES[number])" if p.fits else "(math.nan, math.nan, 0.0)"
-        plain = f"        value = value if finite else guess if math.isfinite(guess) else {words}[1]"
+        words = "regressed(x, SQUARES[number])" if p.fits else "(math.nan, 0.0)"
+        plain = f"        value = value if finite else guess if math.isfinite(guess) else {words}[0]"
         if any(a.trust is not None for a in p.answers):
             plain = (
                 f"        said = value, guess, *{words}\n"
@@ -812,15 +819,15 @@ def situation(used, near, target, stands):
 _TRUST = '''
 def settled(number, said, outcome, mode, margin, x, odds):
     """Value, outcome and mode of a prediction, once it is known how right such ones were, and how sure that is."""
-    value, guess, linear, products, far = said
+    value, guess, regression, far = said
     if TRUST[number] is None:
-        known = next((each for each in (value, guess) if math.isfinite(each)), products)
+        known = next((each for each in (value, guess) if math.isfinite(each)), regression)
         return known, outcome, mode, (math.nan, math.nan)
     beliefs, lawful, distant, rests, latest = TRUST[number]
     present = x[NEXT + ANSWERS[number][1]]
     last = latest[1](x) if latest else math.nan
-    values = value, guess, linear, products, last, present
-    able = sum(1 << k for k, each in enumerate(values[:5]) if math.isfinite(each))
+    values = value, guess, regression, last, present
+    able = sum(1 << k for k, each in enumerate(values[:4]) if math.isfinite(each))
     winner = -mode if lawful else mode
     lead = 0
     if margin > 0.0:
@@ -862,12 +869,12 @@ def in_order(terms):
 
 
 def regressed(x, squares):
-    """The next value by least squares on some numbers, and what that and least squares on their products say together.
+    """The next value by least squares on some numbers and on their products, each as far as the leverage allows.
 
-    Each counts as far as the leverage allows. And the squared distance from what was learned, 1 in the mean.
+    And the squared distance from what was learned, 1 in the mean.
     """
     if squares is None:
-        return math.nan, math.nan, 0.0
+        return math.nan, 0.0
     present, fit, weights, least, most, trusted = squares
     columns, reach = fit
     z = [(x[c] - centre) / scale for c, centre, scale in columns]
@@ -876,19 +883,19 @@ def regressed(x, squares):
         words = [in_order(np.array([1.0, *shown]) * np.array(row)) for shown, row in zip(both, weights)]
     words = [min(max(word, least), most) if word == word else word for word in words]
     whole, distance = 0.0, math.nan
-    for word, shown, (mean, text), (bias, growth, midst) in zip(words, both, reach, trusted):
+    for word, shown, (mean, text), (growth, midst, say) in zip(words, both, reach, trusted):
         off = np.array(shown) - np.array(mean)
         with np.errstate(over="ignore", invalid="ignore"):
             far = in_order(off * np.add.accumulate(spread(text, len(mean)) * off[:, None])[-1])
         h = (far if far >= 0.0 else math.inf) + midst
         if distance != distance:
             distance = h / min(1.0, len(mean) * midst)
-        more = growth * h if growth > 0.0 else 0.0
-        share = bias / (bias + more) if bias > 0.0 else 0.0
+        share = say[0]
+        for weight, rate in zip(say[1:], RATES[1:]):
+            share = share + weight / (1.0 + rate * (h * growth))
         if math.isfinite(word):
             whole = whole + share * (word - whole)
-    products = x[present] + whole if math.isfinite(words[0]) else math.nan
-    return x[present] + words[0], products, distance
+    return x[present] + whole if math.isfinite(words[0]) else math.nan, distance
 
 '''
 

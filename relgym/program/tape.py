@@ -153,7 +153,7 @@ def space_of(most: Sizes) -> np.dtype[np.void]:
         ("given_values", np.float64, (answers,)),
         ("touched", np.int64, (answers,)),  # whom a mover touches; or the mode that gave a value
         # What the winner, the guess, both regressions and the mode that held last say of each answer; NaN: nothing.
-        ("experts", np.float64, (answers, 5)),
+        ("experts", np.float64, (answers, 4)),
         ("fitted", np.int64, (1,)),  # what regressions look at lies in `shown`; 0: nothing does
         ("shown", np.float64, (2, most.shown)),  # that, and how far from what they know
         ("leverage", np.float64, (2,)),  # of both regressions there
@@ -607,7 +607,7 @@ class _Writer:
             return 0
         weights = [self.num(*row) for row in r.weights]
         reach = self.num(
-            r.least, r.most, *(v for each in r.trusted for v in (each.bias, each.more, each.least))
+            r.least, r.most, *(v for each in r.trusted for v in (each.growth, each.least, *each.say))
         )
         self.reaches.append(reach)
         return self.put(self.fits[r.fit], *self.col(r.present), reach, *weights)
@@ -631,12 +631,12 @@ def ordered(beliefs: Iterable[ir.Belief]) -> list[ir.Belief]:
 
 def kind_of(number: int) -> tuple[int, int, int]:
     """Outcome, winner and lead of a kind of predictions, from its number as the kernel works it out."""
-    rest, outcome = divmod(number // 32, 8)
+    rest, outcome = divmod(number // 16, 8)
     return outcome, rest // 16, rest % 16 - 2
 
 
 def _kind(belief: ir.Belief) -> int:
-    return ((belief.winner * 16 + belief.lead + 2) * 8 + belief.outcome) * 32 + belief.able
+    return ((belief.winner * 16 + belief.lead + 2) * 8 + belief.outcome) * 16 + belief.able
 
 
 def _variables(literal: ir.Literal) -> set[int]:

@@ -74,25 +74,26 @@ def test_a_name_of_what_stands_below_is_no_answers_name() -> None:
 def test_least_squares_by_hand() -> None:
     """z = (4 - 2) / 2 = 1 and (1 - 0) / 1 = 1: 0.5 + z_1 + 2 z_2 = 3.5, kept to 3; with products 1.75.
 
-    With a leverage of 1/2 the first word counts 1 / (1 + 5 / 2), the second one 3 / (3 + 5 / 2).
+    The leverage is 1/2, the squared distances are 2 and 1: by half a say of the rate 1 the first word counts for 1/6,
+    and for 1/4 beside, for 5/12; by a quarter of that of 4 the second one for 1/20.
     """
     columns = ((1, 2.0, 2.0), (2, 0.0, 1.0))
     weights = ((0.5, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 0.25, 0.5))  # 1, z1, z2; then z1 z1, z1 z2, z2 z2
     leverage = tuple(ir.Leverage((0.0,) * d, b64encode(bytes(2 * d * (d + 1))).decode()) for d in (2, 5))
-    trusted = ir.Trusted(1.0, 5.0, 0.5), ir.Trusted(3.0, 5.0, 0.5)
+    trusted = (
+        ir.Trusted(4.0, 0.5, (0.25, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0)),
+        ir.Trusted(2.0, 0.5, (0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0)),
+    )
     squares = ir.Regression(0, 0, weights, -3.0, 3.0, trusted)
-    told = {}
-    for speaker in (2, 3):
-        beliefs = tuple(ir.Belief(1, 0, -2, able, speaker, 0.75, 0.125, True) for able in (0, 4, 8, 12))
-        answer = ir.Answer(
-            "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, 0), regression=squares
-        )
-        program = empty(3, 9, answers=(answer,), fits=(ir.Fit(columns, leverage),))
-        said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))
-        told[speaker] = said.after[0, 0]
-        assert (said.outcomes[0, 0], said.probabilities[0, 0], said.intervals[0, 0]) == (1, 0.75, 0.125)
-    first = 3.0 / 3.5
-    assert told == {2: 13.0, 3: pytest.approx(10.0 + first + 3.0 / 5.5 * (1.75 - first))}
+    beliefs = tuple(ir.Belief(1, 0, -2, able, 2, 0.75, 0.125, True) for able in (0, 4))
+    answer = ir.Answer(
+        "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, 0), regression=squares
+    )
+    program = empty(3, 9, answers=(answer,), fits=(ir.Fit(columns, leverage),))
+    said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))
+    assert (said.outcomes[0, 0], said.probabilities[0, 0], said.intervals[0, 0]) == (1, 0.75, 0.125)
+    first = 3.0 * 5.0 / 12.0
+    assert said.after[0, 0] == pytest.approx(10.0 + first + (1.75 - first) / 20.0)
 
 
 def test_text_that_a_model_says_stands_in_the_docstring_whatever_it_is() -> None:

@@ -124,7 +124,7 @@ def _step(p: ir.Program, now: Sequence[float]) -> tuple[list[float], list[tuple[
         sure = math.nan, math.nan
         words = _regressed(p, a.regression, x)
         if a.trust is None:
-            value = next((each for each in (value, guess) if math.isfinite(each)), words[1])
+            value = next((each for each in (value, guess) if math.isfinite(each)), words[0])
         else:
             value, outcome, mode, sure = _trusted(
                 a, a.trust, x, p.width, (value, outcome, mode, margin, guess), words
@@ -266,15 +266,15 @@ def _trusted(
     x: Sequence[float],
     width: int,
     said: tuple[float, int, int, float, float],
-    regressed: tuple[float, float, float],
+    regressed: tuple[float, float],
 ) -> tuple[float, int, int, tuple[float, float]]:
     value, outcome, mode, margin, guess = said
     functions = {m.id: m.function for m in a.modes}
     function = functions.get(trust.latest)
     latest = math.nan if function is None else _sum(function, x)
-    *words, far = regressed
-    values = dict(zip(ir.EXPERTS, (value, guess, *words, latest, x[width + a.column]), strict=True))
-    able = sum(1 << k for k, e in enumerate(ir.EXPERTS[:5]) if math.isfinite(values[e]))
+    regression, far = regressed
+    values = dict(zip(ir.EXPERTS, (value, guess, regression, latest, x[width + a.column]), strict=True))
+    able = sum(1 << k for k, e in enumerate(ir.EXPERTS[:4]) if math.isfinite(values[e]))
     kind = PREDICTED if mode else outcome
     # Bins of leads: below 1/2, 1, 2, 4, 8, and more; 0: none, 7: nobody else was in it.
     lead = (
@@ -295,18 +295,18 @@ def _trusted(
     return values[ir.EXPERTS[b.speaker]], outcome, mode, (b.probability, b.interval)
 
 
-def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tuple[float, float, float]:
-    """What both regressions say, the second one as far as their leverages allow; how far the first one is asked."""
+def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tuple[float, float]:
+    """What regressions say, each as far as its leverage allows; how far the first one is asked."""
     if r is None:
-        return math.nan, math.nan, 0.0
-    fit, words, distances, whole = p.fits[r.fit], list[float](), list[float](), 0.0
+        return math.nan, 0.0
+    fit, distances, whole = p.fits[r.fit], list[float](), 0.0
     shown = [(x[c] - centre) / scale for c, centre, scale in fit.columns]
     both = shown, shown + [a * b for a, b in itertools.combinations_with_replacement(shown, 2)]
     for z, row, reach, known in zip(both, r.weights, fit.leverage, r.trusted, strict=False):
         word = row[0]
         for weight, each in zip(row[1:], z, strict=True):
             word += weight * each
-        words.append(min(max(word, r.least), r.most))
+        word = min(max(word, r.least), r.most)
         entries = iter(struct.unpack(f"<{len(z) * (len(z) + 1) // 2}f", b64decode(reach.spread)))
         off, far = [a - b for a, b in zip(z, reach.mean, strict=True)], 0.0
         for i in range(len(z)):
@@ -316,9 +316,11 @@ def _regressed(p: ir.Program, r: ir.Regression | None, x: Sequence[float]) -> tu
             far += off[i] * along
         h = (far if far >= 0.0 else math.inf) + known.least
         distances.append(h / min(1.0, len(z) * known.least))
-        more = known.more * h if known.more else 0.0
-        whole += (known.bias / (known.bias + more) if known.bias else 0.0) * (words[-1] - whole)
-    return x[r.present] + words[0], x[r.present] + whole, distances[0]
+        share = known.say[0]
+        for k, weight in enumerate(known.say[1:]):  # 1/64, 1/16, 1/4, 1, 4, 16, 64
+            share += weight / (1.0 + 4.0 ** (k - 3) * (h * known.growth))
+        whole += share * (word - whole)
+    return x[r.present] + whole, distances[0]
 
 
 # ---------------------------------------------------------------------- making them up
@@ -447,7 +449,11 @@ class _Maker:
         widths = [len(each.mean) for each in self.fits[number].leverage]
         weights = tuple(tuple(self.small() for _ in range(width + 1)) for width in widths)
         trusted = tuple(
-            ir.Trusted(rng.choice((0.0, 0.5, 3.0)), rng.choice((0.0, 0.25)), 1.0 / rng.randint(1, 9))
+            ir.Trusted(
+                rng.choice((1.0, 0.5, 3.0)),
+                1.0 / rng.randint(1, 9),
+                tuple(rng.choice((0.0, 0.125)) for _ in ir.RATES),
+            )
             for _ in widths
         )
         least = rng.randint(-9, 0) / 2
@@ -488,10 +494,10 @@ class _Maker:
         rng = self.rng
         able = [
             bits
-            for bits in range(32)
+            for bits in range(16)
             if (a.guess or a.beyond or not bits & 2)
-            and (latest or not bits & 16)
-            and (a.regression or not bits & 12)
+            and (latest or not bits & 8)
+            and (a.regression or not bits & 4)
         ]
         kinds = [(outcome, who, -2) for outcome in range(6) for who in (-1, 0, 1)]
         winners = [*(mode.id for mode in a.modes), 5, 7]
@@ -500,7 +506,7 @@ class _Maker:
         beliefs = []
         for outcome, winner, lead in kinds:
             for bits in able:
-                speaker = rng.choice([*(k for k in range(5) if bits >> k & 1), 5])
+                speaker = rng.choice([*(k for k in range(4) if bits >> k & 1), 4])
                 sure, width = rng.choice((math.nan, 0.5, 0.99)), rng.randint(1, 99) / 8.0
                 beliefs.append(ir.Belief(outcome, winner, lead, bits, speaker, sure, width, self.coin()))
         return ir.Trust(tuple(beliefs), False, latest, a.regression is not None and self.coin())

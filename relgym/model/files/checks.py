@@ -56,7 +56,9 @@ from relgym.model.files.format import (
 )
 from relgym.model.parts import Parts
 from relgym.model.predicting.calibration import EXPERTS
+from relgym.model.predicting.regression import KINDS
 from relgym.model.target.conditions import Conditions
+from relgym.program.records import RATES
 from relgym.scene.axes import Axes
 from relgym.scene.objects import Target
 
@@ -152,7 +154,7 @@ def _check_calibration(body: Body, known: set[str], experts: int) -> None:
         for cell in calibration.cells:
             _distinct([who for who, *_ in cell.records], "calibration")
             whole = len(cell.squares) == experts > max([cell.speaker, *(who for who, *_ in cell.records)])
-            _require(whole, "calibration", f"expected {experts} experts: six, and config.hypotheses")
+            _require(whole, "calibration", f"expected {experts} experts: five, and config.hypotheses")
         _require(
             all(hits <= trials for _, trials, hits, *_ in records), "calibration", "more hits than trials"
         )
@@ -185,10 +187,7 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
                 all(len(row) == width + 1 for row in weights), where, "expected a weight for each column"
             )
         _require(
-            all(len(each) == count for each in regression.left), where, "expected what is left of each target"
-        )
-        _require(
-            len(regression.left) in (0, 3), where, "expected what is left of nothing, and by two regressions"
+            all(len(each) == count for each in regression.say), where, "expected what counts of each target"
         )
         _require(len(regression.leverage) <= len(regression.ridges), where, "leverage on what there isn't")
         for spread, width in zip(regression.leverage, (d, d + d * (d + 1) // 2), strict=False):
@@ -781,6 +780,12 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
                 _rows(arrays, name, "float64", shape)
                 _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
                 names.add(name)
+        name = f"regression{k}.left"
+        if name in arrays:  # which earlier files don't say
+            _rows(arrays, name, "float64", (KINDS * (len(RATES) + 1), len(regression.targets)))
+            fits = np.isfinite(arrays[name]).all() and (arrays[name] >= 0.0).all()
+            _require(fits, f"history: {name}", "expected mean squares")
+            names.add(name)
     return names
 
 

@@ -25,6 +25,7 @@ from relgym.files.records import (
     Spread,
     Weight,
 )
+from relgym.program.records import RATES
 
 __all__ = [
     "Body",
@@ -56,6 +57,10 @@ Context: TypeAlias = Literal["approached", "touching", "all"]
 Whole: TypeAlias = Annotated[int, Meta(ge=-(2**53), le=2**53, description="a whole number")]
 Terms: TypeAlias = list[tuple[Name, Finite]]
 Counts: TypeAlias = tuple[Weight, Weight]
+Say: TypeAlias = Annotated[
+    list[Annotated[float, Meta(ge=0.0, le=1.0)]],
+    Meta(min_length=len(RATES), max_length=len(RATES), description="how far each rate has a say"),
+]
 
 # ---------------------------------------------------------------------- the scenes' schema
 Point2: TypeAlias = tuple[Finite, Finite]
@@ -431,7 +436,7 @@ class HindsightRecord(Record):
 
 
 Expert: TypeAlias = Annotated[
-    int, Meta(ge=0, description="who gave a value, as a place among all experts: six, and hypotheses")
+    int, Meta(ge=0, description="who gave a value, as a place among all experts: five, and hypotheses")
 ]
 Squares: TypeAlias = Annotated[
     float, Meta(ge=0.0, le=1e304, description="a sum of squares of errors, each of 1e150 at most")
@@ -473,7 +478,7 @@ class CellRecord(Record):
     steady: Count
     passed: Count
     records: list[tuple[Expert, Weight, Weight, Whole, Bins, Runs]]
-    squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=6)]
+    squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=5)]
     doubt: Weight = 0.0
     since: Count | None = None
 
@@ -506,7 +511,7 @@ class RegressionRecord(Record):
     range: tuple[list[float], list[float]]
     waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
     ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
-    left: Annotated[list[list[Annotated[float, Meta(ge=0.0)]]], Meta(max_length=3)] = []
+    say: tuple[list[Say], list[Say]]
     leverage: Annotated[list[LeverageRecord], Meta(max_length=2)] = []
 
 

@@ -6,9 +6,12 @@ whoever checks the result against `relgym.model.files.format`.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Mapping
 from typing import Any, Final
+
+from relgym.program.records import RATES
 
 __all__ = ["upgraded"]
 
@@ -47,14 +50,17 @@ def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
     UserWarning
         The model was learned with a setting that is gone, and with another value of it than the present rules have.
     """
-    if version >= 4:
+    if version >= 5:
         return body
     found = dict(body)
+    if isinstance(body.get("regressions"), dict):
+        found["regressions"] = {name: _with_say(each) for name, each in body["regressions"].items()}
     if version < 3 and isinstance(body.get("config"), dict):
         found["config"] = _without_retired(body["config"])
     if isinstance(body.get("calibration"), dict):
-        complete = _with_runs if version < 3 else _steady
-        found["calibration"] = {name: complete(each) for name, each in body["calibration"].items()}
+        found["calibration"] = {
+            name: _one_regression(_completed(each, version)) for name, each in body["calibration"].items()
+        }
     return found
 
 
@@ -79,6 +85,13 @@ def _without_retired(config: Mapping[str, Any]) -> dict[str, Any]:
             stacklevel=2,
         )
     return found
+
+
+def _completed(calibration: Any, version: int) -> Any:
+    """A calibration with all that version 4 tells."""
+    if version >= 4:
+        return calibration
+    return _with_runs(calibration) if version < 3 else _steady(calibration)
 
 
 def _with_runs(calibration: Any) -> Any:
@@ -114,3 +127,62 @@ def _cell(cell: Any) -> Any:
     trials = [each[1] for each in records if isinstance(each, list) and len(each) == 6]
     heard = max((each for each in trials if isinstance(each, (int, float))), default=0.0)
     return {"heard": heard, **cell, "records": records}
+
+
+_LINEAR: Final = 2
+"""Place of an expert that there was before version 5: linear regression, which is part of regression on everything."""
+
+
+def _one_regression(calibration: Any) -> Any:
+    """A calibration without the expert that is gone; where it spoke, the one that it is part of does."""
+    if not isinstance(calibration, dict) or not isinstance(calibration.get("cells"), list):
+        return calibration
+    return {**calibration, "cells": [_without_linear(cell) for cell in calibration["cells"]]}
+
+
+def _without_linear(cell: Any) -> Any:
+    if not isinstance(cell, dict):
+        return cell
+    found = dict(cell)
+    if isinstance(speaker := cell.get("speaker"), int):
+        found["speaker"] = speaker - (speaker > _LINEAR)
+    if isinstance(squares := cell.get("squares"), list):
+        found["squares"] = squares[:_LINEAR] + squares[_LINEAR + 1 :]
+    if isinstance(records := cell.get("records"), list):
+        found["records"] = [
+            [each[0] - (each[0] > _LINEAR), *each[1:]] if _tells(each) else each
+            for each in records
+            if not _tells(each) or each[0] != _LINEAR
+        ]
+    return found
+
+
+def _tells(record: Any) -> bool:
+    """Whether a record says whose it is."""
+    return isinstance(record, list) and bool(record) and isinstance(record[0], int)
+
+
+def _with_say(regression: Any) -> Any:
+    """A regression with what version 5 tells of its words: how far each rate by which they count has a say.
+
+    Before, a word counted for 1 / (1 + s q / b) at a squared distance q, of which the words before it left b more than
+    it, s: now the rate next to s / b has the say. Where nothing is known of that the word counts everywhere.
+    """
+    if not isinstance(regression, dict) or not isinstance(regression.get("targets"), list):
+        return regression
+    found = dict(regression)
+    try:
+        nothing, linear, products = (list(map(float, each)) for each in found.pop("left", ()))
+        least = map(min, nothing, linear)
+        found["say"] = [list(map(_say, nothing, linear)), list(map(_say, least, products))]
+    except (TypeError, ValueError):
+        found["say"] = [[_say(1.0, 0.0) for _ in regression["targets"]]] * 2
+    return found
+
+
+def _say(before: float, left: float) -> list[float]:
+    rate = left / (before - left) if before > left else math.inf
+    if rate > 2.0 * RATES[-1]:
+        return [0.0] * len(RATES)
+    nearest = min(RATES, key=lambda each: abs(math.log(each + 1e-3) - math.log(rate + 1e-3)))
+    return [float(each == nearest) for each in RATES]

@@ -59,23 +59,23 @@ __all__ = [
     "lead_bins",
 ]
 
-EXPERTS: Final = ("own", "guess", "linear", "products", "latest", "persistence")
-"""Who may give a value: the winner of the vote (or the law); the guess; both regressions; the mode that held last,
-since what decides may be hidden, and a law that changed stays changed; and that nothing changes."""
+EXPERTS: Final = ("own", "guess", "regression", "latest", "persistence")
+"""Who may give a value: the winner of the vote (or the law); the guess; regressions on everything; the mode
+that held last, since what decides may be hidden, and a law that changed stays changed; and that nothing changes."""
 
-OWN, GUESS, LINEAR, PRODUCTS, LATEST, PERSISTENCE = range(len(EXPERTS))
+OWN, GUESS, REGRESSION, LATEST, PERSISTENCE = range(len(EXPERTS))
 
-_KNOWN: Final = (LINEAR, PRODUCTS, PERSISTENCE)
+_KNOWN: Final = (REGRESSION, PERSISTENCE)
 """What anybody would try first."""
 
-_FITTED: Final = (GUESS, LINEAR, PRODUCTS)
+_FITTED: Final = (GUESS, REGRESSION)
 """Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i,
 as least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
 
-_VALUES: Final = (GUESS, LINEAR, PRODUCTS, PERSISTENCE)
+_VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 """Who makes no claims."""
 
-_BY_DEFAULT: Final = (OWN, GUESS, PRODUCTS, PERSISTENCE)
+_BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
 MEMORY: Final = 1024

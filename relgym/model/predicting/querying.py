@@ -17,9 +17,9 @@ from relgym.model.predicting.calibration import (
     EXPERTS,
     GUESS,
     LATEST,
-    LINEAR,
     OWN,
     PERSISTENCE,
+    REGRESSION,
     Audit,
     Key,
     far_bin,
@@ -35,7 +35,6 @@ from relgym.model.predicting.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.predicting.regression import KINDS
 from relgym.model.target.property_model import PropertyModel, Verdict
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
@@ -248,7 +247,7 @@ def _experts_one(
     found[LATEST] = math.nan if latest is None else float(latest[0])
     changes = parts.regressed(percept, index, target.property) if model.rough else None
     if changes is not None:
-        found[LINEAR : LINEAR + KINDS] = [present + change for change in changes[0].tolist()]
+        found[REGRESSION] = present + float(changes[0])
     if model.candidates:
         found[len(EXPERTS) :] = _hypothesised(parts, target, percept, index)[0].tolist()
     return tuple([value if math.isfinite(value) else math.nan for value in found])
@@ -285,8 +284,8 @@ def _experts(
     if model.rough and not parts.governs(target):
         changes = parts.regressed(percept, index, target.property)
         if changes is not None:
-            told = present[:, None] + changes
-            found[:, LINEAR : LINEAR + KINDS] = np.where(np.isfinite(told), told, np.nan)
+            told = present + changes
+            found[:, REGRESSION] = np.where(np.isfinite(told), told, np.nan)
     if model.candidates and not parts.governs(target):
         found[:, len(EXPERTS) :] = _hypothesised(parts, target, percept, index)
     return found

@@ -4,21 +4,23 @@ Regression of the change on (x, u, 1), and on squares and products of these wher
 try first. So it is tried beside everything else, and where it codes what comes in fewer bits it gives the value
 (`relgym.model.predicting.calibration`). It claims nothing: it has no conditions.
 
-Where a row lies far from all that were learned, a regression errs by far more than among them, and the more so the more
-columns it has. So the second kind counts each word as far as its leverage h allows: first that nothing changes, then
-the linear one's, then the products'. What a regression leaves, s in the mean square in the midst of n rows of d
-columns, is mostly misfit: other slopes would suit other places. That grows with the squared distance from what is
-known, which is h n, and d of a row like those: to s (1 + h n / d), of fewer rows than columns to s (1 + h). What the
-words before it leave is more by b everywhere. What adds up to the least error is b / (b + s h n / d) of its word, and
-the rest of theirs (shrinkage: James & Stein 1961).
+Where a row lies far from all that were learned, a regression errs by more than among them, and the more so the more
+columns it has. So each word counts as far as its leverage h allows: first that nothing changes, then the linear
+regression's, then that of products. At a squared distance q = h n / d (n rows of d columns; 1 in the mean), which of
+fewer rows than columns is h, a word counts for 1 / (1 + k q), and those before it for the rest: by k a misfit outgrows
+what the word explains (shrinkage: James & Stein 1961; other slopes suit other places). How k does is measured, target
+by target, on what came before it was learned. But far rows are few and come one after the other, so what was best of
+them needn't be of the next ones: all of some k (`RATES`) have a say, with weights that fall exponentially with what is
+left by them, over n rows by the square root of n, as is best whatever comes (Cesa-Bianchi & Lugosi 2006, §2.3).
 """
 
 from __future__ import annotations
 
+import math
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +28,16 @@ from numpy.typing import NDArray
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.config.constants import BEYOND, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
+from relgym.program.records import RATES
 from relgym.scene.objects import TASK
 
 __all__ = ["KINDS", "Regressed", "Regression"]
 
+TINY: Final = 1e-300
+"""Squares below this are none."""
+
 KINDS = 2
-"""Linear; and what all together say, squares and products too, as far as the leverage allows."""
+"""On the numbers themselves, and on these and their squares and products."""
 
 FIRST = 64
 """So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
@@ -43,8 +49,8 @@ class Regressed(NamedTuple):
     Attributes
     ----------
     changes
-        Predicted changes, shape ``(n, KINDS, targets)``: NaN where a regression isn't made, never far beyond the
-        changes that were seen.
+        Predicted changes, shape ``(n, targets)``: NaN where nothing is regressed on, never far beyond the changes that
+        were seen.
     distances
         How far the rows lie from those that were learned, shape ``(n,)``: h n / d, a squared distance that is about 1
         in the mean of those.
@@ -82,8 +88,10 @@ class Regression:
         self._centre = np.zeros(0)
         self._scale = np.ones(0)
         self._range = np.zeros((2, 0))  # smallest and largest change of each target
-        # Mean squares of what was left of each target, where h is 0: by that nothing changes, and each regression.
-        self._left = np.zeros((1 + KINDS, 0))
+        # What is left of each target, in the mean square, if a regression's word counts by one of the rates, and if it
+        # doesn't count; and how far each rate has a say.
+        self._left = np.zeros((KINDS, len(RATES) + 1, 0))
+        self._say = np.zeros((KINDS, len(RATES), 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
         self._texts: dict[int, tuple[NDArray[np.float32], str]] = {}  # see `_text`
 
@@ -104,7 +112,11 @@ class Regression:
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
         missing = len(y) - self._range.shape[1]
         if missing:
-            self._range, self._left = (np.pad(a, ((0, 0), (0, missing))) for a in (self._range, self._left))
+            self._range, self._left, self._say = (
+                np.pad(each, ((0, 0),) * (each.ndim - 1) + ((0, missing),))
+                for each in (self._range, self._left, self._say)
+            )
+            self._say[:, 0, -missing:] = 1.0  # all of a word counts
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
             self._compare(x, y)
@@ -132,13 +144,21 @@ class Regression:
         found, leverage = self._said(x[None])
         if not np.isfinite(leverage).all():  # a gross error, which isn't learned either
             return
-        size = np.abs(np.concatenate([np.zeros((1, len(y))), found[0]]) - y)
-        size[1:] /= np.sqrt(1.0 + leverage[0] * self._growth())[:, None]
-        known = np.isfinite(size)
-        rate = min(1.0, 2.0 / (self._ridges[0].rows - FIRST + 1))  # each counts in proportion to its number
-        squares = np.square(np.minimum(np.where(known, size, 0.0), np.sqrt(SUMMABLE)))
-        begun = np.where(np.isfinite(self._left), self._left, squares)
-        self._left = np.where(known, begun + rate * (squares - begun), self._left)
+        trials = self._ridges[0].rows - FIRST + 1
+        late = min(1.0, 2.0 / trials)  # each counts in proportion to its number
+        whole = np.zeros(len(y))
+        with np.errstate(over="ignore"):
+            far = leverage[0] * self._growth()
+        for kind, (word, q) in enumerate(zip(found[0, : len(self._ridges)], far.tolist(), strict=False)):
+            known, left = np.isfinite(word), self._left[kind]
+            more = np.where(known, word - whole, 0.0)
+            shares = np.array([*(1.0 / (1.0 + rate * q) for rate in RATES), 0.0])
+            size = np.minimum(np.abs(whole + shares[:, None] * more - y), np.sqrt(SUMMABLE))
+            left += np.where(known, late * (np.square(size) - left), 0.0)
+            whole = whole + _counted(self._say[kind], q) * more
+            bits = np.log2(np.maximum(left, TINY))
+            say = np.exp2(0.5 * math.sqrt(trials) * (bits.min(axis=0) - bits))
+            self._say[kind] = (say / say.sum(axis=0))[:-1]
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
         with np.errstate(over="ignore"):  # what isn't finite is left out
@@ -161,17 +181,15 @@ class Regression:
         """What they say of rows ``(n, width)``; None while there is nothing."""
         if not self._ridges or (places := self._columns(signature)) is None:
             return None
-        found, leverage = self._said(x[:, places])
-        whole = np.zeros_like(found[:, 0])
-        for k in range(len(self._ridges)):
-            word = found[:, k]
-            whole = np.where(
-                np.isfinite(word), whole + self._share(k, leverage[:, k]) * (word - whole), whole
-            )
-        found[:, 1] = np.where(np.isfinite(found[:, 0]), whole, np.nan)
-        first = self._ridges[0]
-        with np.errstate(over="ignore"):
-            return Regressed(found, leverage[:, 0] / min(1.0, first.columns * (1.0 / max(first.rows, 1))))
+        words, leverage = self._said(x[:, places])
+        found, first = np.zeros_like(words[:, 0]), self._ridges[0]
+        with np.errstate(over="ignore"):  # what lies that far is far from all
+            far = leverage * self._growth()
+            for kind in range(len(self._ridges)):
+                word, share = words[:, kind], _counted(self._say[kind][:, None], far[:, kind, None])
+                found = np.where(np.isfinite(word), found + share * (word - found), found)
+            distances = leverage[:, 0] / min(1.0, first.columns * (1.0 / max(first.rows, 1)))
+        return Regressed(np.where(np.isfinite(words[:, 0]), found, np.nan), distances)
 
     def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and leverages, ``(n, KINDS)``."""
@@ -184,25 +202,8 @@ class Regression:
                 leverage[:, k] = ridge.leverage(columns)
         return np.clip(found, *self._bounds()), leverage
 
-    def _share(self, kind: int, leverage: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far a regression's word counts, at leverages ``(n,)``, for each target, shape ``(n, targets)``."""
-        bias, left = self._bias(kind)
-        with np.errstate(over="ignore", invalid="ignore"):
-            more = np.where(left > 0.0, left * leverage[:, None], 0.0)
-            return np.where(bias > 0.0, bias / (bias + more), 0.0)
-
-    def _bias(self, kind: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """How much more the words before a regression leave of each target than it, and what it leaves more at h = 1.
-
-        In the mean square. Where nobody ever compared them it has the last word.
-        """
-        left = self._left[kind + 1]
-        known = np.isfinite(left)
-        bias = np.maximum(self._left[: kind + 1].min(axis=0) - left, 0.0)
-        return np.where(known, bias, 1.0), np.where(known, left * self._growth()[kind], 0.0)
-
     def _growth(self) -> NDArray[np.float64]:
-        """By how much of itself what each regression leaves grows with a leverage of 1, shape ``(KINDS,)``."""
+        """The squared distance at a leverage of 1, for each regression, shape ``(KINDS,)``."""
         found = np.ones(KINDS)
         for k, ridge in enumerate(self._ridges):
             found[k] = max(1.0, ridge.rows / ridge.columns)
@@ -233,15 +234,14 @@ class Regression:
 
     @property
     def trusted(self) -> NDArray[np.float64]:
-        """How far the word of each regression counts for each target, shape ``(targets, regressions, 3)``.
+        """How far the word of each regression counts for each target, shape ``(targets, regressions, k)``.
 
-        What the words before it leave more than it, what it leaves more at h = 1, both in the mean square, and 1 / rows
-        (`relgym.program.records.Trusted`).
+        The squared distance at h = 1, 1 / rows, and how far each rate has a say (`relgym.program.records.Trusted`).
         """
-        found = np.empty((len(self.targets), len(self._ridges), 3))
+        found, growth = np.empty((len(self.targets), len(self._ridges), 2 + len(RATES))), self._growth()
         for kind, ridge in enumerate(self._ridges):
-            found[:, kind, 0], found[:, kind, 1] = self._bias(kind)
-            found[:, kind, 2] = 1.0 / max(ridge.rows, 1)
+            found[:, kind, 0], found[:, kind, 1] = growth[kind], 1.0 / max(ridge.rows, 1)
+            found[:, kind, 2:] = self._say[kind].T
         return found
 
     @property
@@ -283,7 +283,6 @@ class Regression:
     # ------------------------------------------------------------------ saving
     def to_json(self, *, history: bool) -> dict[str, Any]:
         """Plain data; with history what further learning needs, too, but the sums in `to_arrays`."""
-        compared = bool(np.isfinite(self._left).all())  # a file of earlier versions tells nothing of it
         return {
             "names": list(self.names),
             "seen": self.seen,
@@ -291,17 +290,15 @@ class Regression:
             "centre": self._centre.tolist(),
             "scale": self._scale.tolist(),
             "range": self._range.tolist(),
-            "left": self._left.tolist() if compared else [],
+            "say": self._say.transpose(0, 2, 1).tolist(),
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges]
-            if compared
-            else [],
+            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Sums that further learning adds to."""
-        found: dict[str, NDArray[Any]] = {}
+        found: dict[str, NDArray[Any]] = {"left": self._left.reshape(-1, len(self.targets))}
         for k, ridge in enumerate(self._ridges):
             arrays = ridge.to_arrays()
             found |= {f"gram{k}": arrays["gram"], f"moments{k}": arrays["moments"]}
@@ -320,14 +317,24 @@ class Regression:
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
-        self._left = np.full((1 + KINDS, len(self.targets)), np.nan)
-        if data.get("left"):
-            self._left = np.array(data["left"], dtype=np.float64).reshape(self._left.shape)
+        count = len(self.targets)
+        say = np.array(data["say"], dtype=np.float64).reshape(KINDS, count, len(RATES))
+        self._say = np.ascontiguousarray(say.transpose(0, 2, 1))
+        left = arrays.get("left", np.zeros((KINDS * (len(RATES) + 1), count)))
+        self._left = left.reshape(KINDS, -1, count).copy()
         for ridge in self._ridges:
             ridge.spread = np.zeros_like(ridge.spread)
         for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
             ridge.mean = np.array(known["mean"], dtype=np.float64)
             ridge.spread = _unpacked(known["inverse"], ridge.columns)
+
+
+def _counted(say: NDArray[np.float64], far: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """How far words count, by what each rate has to say, shape ``(rates, ...)``, at squared distances."""
+    found: NDArray[np.float64] = say[0]
+    for weight, rate in zip(say[1:], RATES[1:], strict=True):
+        found = found + weight / (1.0 + rate * far)
+    return found
 
 
 @cache

@@ -331,7 +331,9 @@ class _Lowering:
             return None
         weights, bounds = told
         number = learned.targets.index(target.property)
-        trusted = tuple(ir.Trusted(*each) for each in learned.trusted[number].tolist())
+        trusted = tuple(
+            ir.Trusted(growth, least, tuple(say)) for growth, least, *say in learned.trusted[number].tolist()
+        )
         column = self.layout.column(index, target.property)
         return ir.Regression(fit[0], column, weights, *bounds, trusted)
 

@@ -45,7 +45,7 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
             raise ir.BeyondError("laws of hypothesis classes that were added")
         latest = _latest(model, a)
         able = 1 | (2 if a.guess is not None or a.beyond is not None else 0)
-        able |= (12 if a.regression is not None else 0) | (16 if latest else 0)
+        able |= (4 if a.regression is not None else 0) | (8 if latest else 0)
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))

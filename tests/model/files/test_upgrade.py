@@ -19,11 +19,14 @@ from relgym.model.files.format import CalibrationRecord
 from relgym.model.files.storage import VERSION, read_model, write_model
 from relgym.model.files.upgrade import upgraded
 from relgym.model.world_model import WorldModel
+from relgym.program.records import RATES
 from relgym.scene.objects import Transition
 
 FOLDER = Path(__file__).parent
 FILES = {
-    path.stem: path for folder in ("v1", "v2", "v3") for path in sorted((FOLDER / folder).glob("*.relgym"))
+    path.stem: path
+    for folder in ("v1", "v2", "v3", "v4")
+    for path in sorted((FOLDER / folder).glob("*.relgym"))
 }
 
 
@@ -126,7 +129,37 @@ def test_calibrations_get_what_came_later() -> None:
     assert cell["heard"] == 12.0  # whoever was looked back at most often
     assert found["vouched"] == 0.0
     checked(found, CalibrationRecord, "the calibration")
-    assert upgraded({"calibration": {"ball.x": found}}, 2)["calibration"]["ball.x"] == found  # once is enough
+
+
+def test_linear_regression_is_part_of_regression_on_everything() -> None:
+    """Who spoke in its place does; the others are one place further up."""
+    records = [[k, 10.0 + k, 8.0, 3, [[0, 9.0]], [0.0] * 4] for k in (0, 2, 3, 6)]
+    squares = [[float(k), 2.0, 3.0] for k in range(7)]
+    old = {"cells": [{"speaker": k, "records": records, "squares": squares} for k in (0, 2, 3, 5, 6)]}
+    kept = copy.deepcopy(old)
+    cells = upgraded({"calibration": {"ball.x": old}}, 4)["calibration"]["ball.x"]["cells"]
+    assert old == kept
+    assert [cell["speaker"] for cell in cells] == [0, 2, 2, 4, 5]
+    for cell in cells:
+        assert [(who, trials) for who, trials, *_ in cell["records"]] == [(0, 10.0), (2, 13.0), (5, 16.0)]
+        assert [trials for trials, *_ in cell["squares"]] == [0.0, 1.0, 3.0, 4.0, 5.0, 6.0]
+
+
+def test_words_of_regressions_count_as_they_did() -> None:
+    """By b / (b + s q): of 3 and 4 by the rate 3, next to 4; of 4 and 4 not at all; of 0 and 4 always."""
+    old = {"targets": ["x", "y", "z"], "left": [[4.0, 4.0, 4.0], [3.0, 4.0, 0.0], [2.0, 4.0, 0.0]]}
+    kept = copy.deepcopy(old)
+    found = upgraded({"regressions": {"self": old}}, 4)["regressions"]["self"]
+    assert old == kept
+    assert "left" not in found
+    rates = [
+        [[rate for rate, says in zip(RATES, say, strict=True) if says] for say in kind]
+        for kind in found["say"]
+    ]
+    assert rates == [[[4.0], [], [0.0]], [[1.0], [], []]]  # 2 / 1 lies next to 1 and to 4
+    for unknown in ({"targets": ["x"]}, {"targets": ["x"], "left": []}, {"targets": ["x"], "left": [["?"]]}):
+        found = upgraded({"regressions": {"self": unknown}}, 3)["regressions"]["self"]
+        assert found["say"] == [[[1.0] + [0.0] * (len(RATES) - 1)]] * 2
 
 
 @given(
@@ -136,7 +169,17 @@ def test_calibrations_get_what_came_later() -> None:
             st.lists(inner, max_size=4)
             | st.dictionaries(
                 st.sampled_from(
-                    ["config", "clustering", "votes", "calibration", "cells", "records", "heard"]
+                    [
+                        "config",
+                        "clustering",
+                        "votes",
+                        "calibration",
+                        "cells",
+                        "records",
+                        "heard",
+                        "regressions",
+                        "left",
+                    ]
                 ),
                 inner,
             )
