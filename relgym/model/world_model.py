@@ -541,7 +541,7 @@ class WorldModel:
         return WorldModel(self.schema, self.config, targets=named)
 
     def finish(self) -> int:
-        """Re-learn every stale classifier now, without a budget; returns the work spent.
+        """Re-learn every stale classifier and solve regressions now, without a budget; returns the work spent.
 
         A model without its history has nothing to learn from and stays as it is.
         """

@@ -68,6 +68,7 @@ class OnlineRidge:
         self._gram = np.zeros((columns + 1, columns + 1))
         self._moments = np.zeros((0, columns + 1))
         self._due = due
+        self._solved = 0  # rows that the weights come from, if they were solved here
 
     @property
     def columns(self) -> int:
@@ -96,7 +97,10 @@ class OnlineRidge:
             self.weights = np.pad(self.weights, ((0, missing), (0, 0)))
 
     def solve(self) -> None:
-        """Work out the weights from the rows so far."""
+        """Work out the weights from the rows so far, unless that was done."""
+        if self._solved == self.rows:
+            return
+        self._solved = self.rows
         self._due = max(self.rows + 1, int(GROWTH * self.rows))
         n = float(self.rows)
         if not n:

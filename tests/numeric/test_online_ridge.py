@@ -42,6 +42,19 @@ def test_weights_are_solved_anew_as_rows_become_more() -> None:
     assert max(late) <= GROWTH + 0.04
 
 
+def test_what_is_solved_already_is_left_as_it_is() -> None:
+    x, y = rows(108)
+    ridge = OnlineRidge(3, due=100)  # and after 110 next
+    for one, response in zip(x, y, strict=True):
+        ridge.add(one, response)
+    lagging = ridge.weights
+    ridge.solve()
+    solved = ridge.weights
+    ridge.solve()
+    assert not np.array_equal(lagging, solved)
+    assert ridge.weights is solved
+
+
 def test_a_row_alone_gives_the_same_bits_as_among_others() -> None:
     rng = np.random.default_rng(1)
     ridge = OnlineRidge(37)

@@ -183,7 +183,10 @@ def _there(parts: Parts, transition: Transition, only: frozenset[int] | None) ->
 
 
 def finish(parts: Parts) -> int:
-    """Make all searches that still wait, and re-learn every stale classifier, without a budget; the work spent."""
+    """Make all searches that still wait, re-learn every stale classifier and solve regressions; the work spent.
+
+    All of it without a budget.
+    """
     budget, parts.idle = Budget(), False
     while parts.looks or parts.inquiry is not None:
         _inquire(parts, budget)
@@ -198,6 +201,8 @@ def finish(parts: Parts) -> int:
         if not parts.governs(target):
             work += parts.models[target].refresh(None)
             parts.models[target].reconsider(parts.tables[target.type], budget)
+    for regression in parts.regressions.values():
+        regression.settle()
     return work + budget.spent // UNIT
 
 

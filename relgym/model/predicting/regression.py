@@ -126,6 +126,11 @@ class Regression:
         if len(self._waiting) == FIRST:
             self._begin()
 
+    def settle(self) -> None:
+        """Solve for all rows that there are; meanwhile weights lag by a tenth of them."""
+        for ridge in self._ridges:
+            ridge.solve()
+
     def _begin(self) -> None:
         x = np.array([row for row, _ in self._waiting])
         self._centre = np.median(x, axis=0)

@@ -152,6 +152,26 @@ def test_what_a_line_says_everywhere_counts_everywhere() -> None:
     assert said[0, 1] < 0.7 * own[0, 0, 1]
 
 
+def test_what_came_last_is_known_once_learning_is_finished() -> None:
+    """A change that came for the first time since weights were solved."""
+
+    def step(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [float(s[0] + (s[1] > 3.0)), float(np.tanh(s[1]) + u[0])]
+
+    rng = np.random.default_rng(3)
+    before = np.append(rng.uniform(-1.0, 1.0, size=(106, 2)), [[0.5, 9.0], [-0.5, 9.0]], axis=0)
+    model = WorldModel(SCHEMA)
+    for transition in transitions(SCHEMA, step, before, rng.normal(size=(108, 1))):
+        compare_and_learn(model, transition, model.predict_one(transition.before))
+    regression = model._parts.regressions["self"]
+    row = np.zeros((1, len(SIGNATURE.columns)))
+    row[0, SIGNATURE.column(0, "y")] = 9.0
+    k = regression.targets.index("x")
+    assert regression._said(row[:, regression._columns(SIGNATURE)])[0][0, 0, k] == 0.0
+    model.finish()
+    assert regression._said(row[:, regression._columns(SIGNATURE)])[0][0, 0, k] > 0.5
+
+
 def test_changes_never_go_far_beyond_those_that_were_seen() -> None:
     found = taught(200)
     said = said_of(found, np.full((1, len(SIGNATURE.columns)), 1e6))
