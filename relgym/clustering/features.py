@@ -28,6 +28,7 @@ __all__ = [
     "Feature",
     "Library",
     "check_entries",
+    "features_for",
     "functions_of",
     "known_kinds",
     "library_of",
@@ -272,6 +273,11 @@ def offered(entries: Iterable[str], type_name: str) -> frozenset[str]:
     """Kinds of features that `library_of` offers a type's targets of all properties that have them."""
     parsed = [_parsed(entry) for entry in entries]
     return frozenset(kind for owner, kind, named in parsed if owner in (None, type_name) and not named)
+
+
+def features_for(entries: Iterable[str], type_name: str) -> tuple[str, ...]:
+    """Entries that offer a type's targets something (`relgym.config.ModelConfig.features`)."""
+    return tuple(entry for entry in entries if _parsed(entry)[0] in (None, type_name))
 
 
 def switched_on(

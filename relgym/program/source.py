@@ -628,11 +628,12 @@ class _Source:
         angles = ", ".join(self.names[c] for c in p.angles)
         add(f"ANGLES = ({angles}{',' if angles else ''})\n")
         scene = "Scene(x)" if p.bodies else "None"
-        words = "regressed(x, SQUARES[number])" if p.fits else "(math.nan, 0.0)"
-        plain = f"        value = value if finite else guess if math.isfinite(guess) else {words}[0]"
+        words = "regressed(x, SQUARES[number])" if p.fits else "math.nan, 0.0"
+        other = f"guess if math.isfinite(guess) else {words}[0]" if p.fits else "guess"
+        plain = f"        value = value if finite else {other}"
         if any(a.trust is not None for a in p.answers):
             plain = (
-                f"        said = value, guess, *{words}\n"
+                f"        said = value, guess, {'*' if p.fits else ''}{words}\n"
                 "        value, outcome, mode, sure = settled(number, said, outcome, mode, margin, x, odds)"
             )
         registers = str(p.registers - 2 * p.width)

@@ -16,6 +16,7 @@ from relgym.clustering.features import (
     Atom,
     Library,
     check_entries,
+    features_for,
     functions_of,
     library_of,
     register_function,
@@ -198,3 +199,10 @@ def test_a_library_too_large_is_refused_with_a_remedy() -> None:
     names = [f"x{k}" for k in range(28)]
     with pytest.raises(ConfigError, match=r"at most 6,000; ask for a lower degree"):
         Library(("trig", "degree4")).features(names, [True] * 28)
+
+
+def test_features_for_a_type_are_those_of_all_and_its_own() -> None:
+    entries = ("trig", "self:trig(x, v)", "ball:products")
+    assert features_for(entries, "self") == ("trig", "self:trig(x, v)")
+    assert features_for(entries, "ball") == ("trig", "ball:products")
+    assert features_for(entries[1:], "ramp") == ()

@@ -20,7 +20,7 @@ import math
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,6 @@ from relgym.program.records import RATES
 from relgym.scene.objects import TASK
 
 __all__ = ["KINDS", "Regressed", "Regression"]
-
-TINY: Final = 1e-300
-"""Squares below this are none."""
 
 KINDS = 2
 """On the numbers themselves, and on these and their squares and products."""
@@ -161,7 +158,7 @@ class Regression:
             size = np.minimum(np.abs(whole + shares[:, None] * more - y), np.sqrt(SUMMABLE))
             left += np.where(known, late * (np.square(size) - left), 0.0)
             whole = whole + _counted(self._say[kind], q) * more
-            bits = np.log2(np.maximum(left, TINY))
+            bits = np.log2(np.maximum(left, math.ulp(0.0)))
             say = np.exp2(0.5 * math.sqrt(trials) * (bits.min(axis=0) - bits))
             self._say[kind] = (say / say.sum(axis=0))[:-1]
 

@@ -16,6 +16,7 @@ from relgym.classification.ranking import RankingBatch
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
+from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
@@ -115,7 +116,7 @@ class PropertyModel:
         self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classifying)
         self.casting = Casting(vocabulary, config.classification)
         self.functions = ModeFunctions(self.clusterer, self.casting, config)
-        self.fallback = Fallback(self.clusterer, offered=_offered(config, target.type))
+        self.fallback = Fallback(self.clusterer, offered=bool(features_for(config.features, target.type)))
         self.spreads = Spreads()
         self.limits = Limits()
         self.stops = Stops()
@@ -807,11 +808,6 @@ class PropertyModel:
         self.amended = {int(mode) for mode in data.get("amended", ())}
         self.functions.bound.clear()
         self.fallback.bound.clear()
-
-
-def _offered(config: ModelConfig, type_name: str) -> bool:
-    """Whether non-linear features of a type are offered (`ModelConfig.features`)."""
-    return any(entry.rpartition(":")[0] in ("", type_name) for entry in config.features)
 
 
 def _noisy(labels: NDArray[np.int32]) -> float:

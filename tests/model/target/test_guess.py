@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
-from relgym.config import ModelConfig
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.target.guess import MEMORY, Guesses, _terms
-from relgym.model.target.property_model import _offered
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target, Transition
 
@@ -53,7 +51,7 @@ def regressed(model: WorldModel, scene: Scene) -> float:
     parts = model._parts
     changes = parts.regressed(parts.perception.percept(scene.layout, scene.vector[None]), 0, "v")
     assert changes is not None
-    return float(changes[0, 1])
+    return float(changes[0])
 
 
 def off(model: WorldModel, steps: list[Transition]) -> float:
@@ -90,16 +88,6 @@ def test_without_features_regressions_speak() -> None:
         assert model.predict_one(scene).scene.vector.tobytes() == batch.vectors[k].tobytes()
 
 
-def test_features_of_its_type_are_what_counts() -> None:
-    for features, found in (
-        ((), False),
-        (("trig",), True),
-        (("self:trig(x)",), True),
-        (("ball:trig",), False),
-    ):
-        assert _offered(ModelConfig(features=features), "self") is found
-
-
 def test_what_is_explained_is_not_guessed(model: WorldModel) -> None:
     assert formulas(model, "x") == ["x' = x + v"]
     assert model.property_model("self", "x").fallback.guess is None
@@ -112,7 +100,7 @@ def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
     assert not one.informed
     kept = strollers(1)[0].before
     assert one.value == pytest.approx(kept["self"]["v"] + regressed(model, kept))
-    assert abs(regressed(model, kept)) < 0.01
+    assert abs(regressed(model, kept)) < 0.05  # of noise of 1
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -199,9 +187,7 @@ def test_what_depends_on_what_is_kept_follows_from_it() -> None:
     assert said["self", "x"].outcome is Outcome.DEPENDS
     v = 3.0 + regressed(model, scene)
     assert said.scene["self"].values.tolist() == pytest.approx([2.0 + v, v])
-    assert v == pytest.approx(
-        3.0, abs=0.02
-    )  # of 400 steps that nothing tells of regressions make next to nothing
+    assert v == pytest.approx(3.0, abs=0.1)  # of noise of 1 regressions make next to nothing
     batch = model.predict_batch(scene.layout, scene.vector[None])
     assert batch.vectors[0].tobytes() == said.scene.vector.tobytes()
 
