@@ -10,7 +10,7 @@ from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
 from relgym.baselines.tuned import setting_of
 from relgym.experiments.chapter4.job import Plan
 from relgym.experiments.chapter4.protocol import ABLATIONS, LEARNERS, WHOLE_TEST, Batch, Protocol
-from relgym.experiments.jobs.code import EXPORT, LEARNER
+from relgym.experiments.jobs.code import LEARNER
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 
@@ -30,10 +30,13 @@ __all__ = [
 
 _ROOM: Final = "relgym.experiments.chapter4"
 
+_EXPORT: Final = ("relgym.program.source",)
+"""What writes models down as Python, which no section runs."""
+
 
 def _without(learner: str) -> tuple[str, ...]:
     """What a learner, or a baseline, runs nothing of, though it is imported beside it."""
-    return EXPORT if learner in ("world", "default", "auto") else LEARNER
+    return _EXPORT if learner in ("world", "default", "auto") else LEARNER
 
 
 def nothing(_: Protocol) -> Plan:

@@ -13,7 +13,7 @@ from typing import Final
 
 from relgym.errors import ConfigError
 
-__all__ = ["EXPORT", "LEARNER", "code_version", "modules_behind"]
+__all__ = ["LEARNER", "code_version", "modules_behind"]
 
 _PACKAGE: Final = "relgym"
 
@@ -27,9 +27,6 @@ _LIBRARIES: Final = {
     "torch": "torch",
 }
 """Libraries that results depend on: import name and distribution."""
-
-EXPORT: Final = ("relgym.program.source",)
-"""What writes models down as Python, which no section runs."""
 
 LEARNER: Final = (
     "relgym.classification",
