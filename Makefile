@@ -69,8 +69,8 @@ bench: $(DEV)    ## the benchmarks
 	$(PYTEST) tests/bench -m bench --benchmark-enable --benchmark-only
 
 soak: $(DEV)     ## a million transitions of BallBoxRamp and CartPole: memory, cost and worst step (hours)
-	$(BIN)/python -m relgym.experiments.soak ball cart --steps 1000000
-	$(BIN)/python -m relgym.experiments.soak lander --steps 100000 --history 20000 --every 1000
+	$(BIN)/relgym benchmark soak ball cart
+	$(BIN)/relgym benchmark soak lander --steps 100000 --history 20000
 
 outliers: $(DEV) ## what wrong numbers in the stream cost: clean steps predicted with and without them
 	$(BIN)/relgym benchmark outliers

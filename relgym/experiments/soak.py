@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import ctypes
 import multiprocessing
@@ -12,17 +11,21 @@ import sys
 import time
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.config import ModelConfig
+from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
+from relgym.experiments.criterion import measured
+from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.model.learning.forgetting import SLACK
+from relgym.model.reports.text import Cell, table
 from relgym.wrappers import ModelLearner
 
-__all__ = ["WORLDS", "fill_cache", "give_back", "main", "soak", "summary"]
+__all__ = ["SUITE", "WORLDS", "Course", "course", "fill_cache", "give_back", "soak", "trial"]
 
 WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "ball": ("relgym/BallBoxRamp-v0", {}),
@@ -30,6 +33,13 @@ WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "lander": ("LunarLander-v3", {}),
 }
 """Id and arguments of each world."""
+
+LINES: Final = 100
+"""Lines that a life is told in."""
+
+LARGER, SLOWER = 1.02, 1.25
+"""By how much more memory, and time a step, a life may take at its end: pieces of memory that C libraries keep come to
+a per cent or two; a step is dearer while more is remembered than when the laws were just known."""
 
 
 class _Elsewhere(gym.Env[Any, Any]):
@@ -88,22 +98,16 @@ _CACHED, _PER_SIZE = 1024, 7
 
 
 def soak(
-    name: str,
-    steps: int,
-    *,
-    every: int,
-    hours: float = float("inf"),
-    seed: int = 0,
-    history: int | None = None,
+    name: str, steps: int, *, every: int, seed: int = 0, history: int | None = None
 ) -> list[list[float]]:
-    """Learn from random steps of a world, which runs in another process, and print a line now and then.
+    """Learn from random steps of a world, which runs in another process, and take note now and then.
 
     Parameters
     ----------
     name
         Of `WORLDS`.
-    steps, hours
-        When to end: after so many transitions, or so much time, whichever is first.
+    steps
+        Transitions.
     every
         Transitions from one line to the next.
     seed
@@ -120,10 +124,6 @@ def soak(
     env.action_space.seed(seed)
     env.reset(seed=seed)
     begin, rows, spent, worst = time.monotonic(), list[list[float]](), 0.0, 0.0
-    print(
-        f"{name}: {'transitions':>12} {'hours':>7} {'memory MB':>10} {'mean ms':>9} {'worst ms':>9}",
-        flush=True,
-    )
     for k in range(1, steps + 1):
         action, start = env.action_space.sample(), time.thread_time()
         _, _, terminated, truncated, _ = env.step(action)
@@ -131,26 +131,33 @@ def soak(
         spent, worst = spent + took, max(worst, took)
         if terminated or truncated:
             env.reset()
-        over = time.monotonic() - begin >= 3600.0 * hours
-        if k % every == 0 or over:
-            passed = (time.monotonic() - begin) / 3600.0
-            rows.append([k, passed, _memory(), 1e3 * spent / (k % every or every), 1e3 * worst])
-            print(
-                f"{name}: {k:12,} {passed:7.3f} {rows[-1][2]:10.1f} {rows[-1][3]:9.3f} {rows[-1][4]:9.1f}",
-                flush=True,
-            )
+        if k % every == 0:
+            rows.append([k, (time.monotonic() - begin) / 3600.0, _memory(), 1e3 * spent / every, 1e3 * worst])
             spent = worst = 0.0
-        if over:
-            break
     env.close()
     return rows
 
 
-def summary(rows: list[list[float]], bound: int) -> str:
-    """What became of memory and cost in a long life.
+class Course(NamedTuple):
+    """What became of memory and cost in a long life (`course`).
 
-    A line's memory is that of one moment, in which a search may be under way; so medians of quarters are compared. What
-    a step costs at the end is compared with what it cost from 10,000 to 20,000 transitions, when the laws are known.
+    Attributes
+    ----------
+    memory
+        MB: medians of the first and the last quarter of what follows the bound, and the most there.
+    cost
+        ms a step: in the median from 10,000 to 20,000 transitions, when the laws are known (of shorter lives in the first
+        quarter), and in the last quarter.
+    """
+
+    memory: tuple[float, float, float]
+    cost: tuple[float, float]
+
+
+def course(rows: list[list[float]], bound: int) -> Course | None:
+    """What became of memory and cost; of fewer than four lines after the bound nothing can be told.
+
+    A line's memory is that of one moment, in which a search may be under way; so medians of quarters are compared.
 
     Parameters
     ----------
@@ -158,22 +165,14 @@ def summary(rows: list[list[float]], bound: int) -> str:
         As `soak` returns them.
     bound
         Transitions after which no more examples are kept than before.
-
-    Returns
-    -------
-    A sentence on each, of a run with four lines at least after the bound; else that it was too short.
     """
     after = [row for row in rows if row[0] >= bound]
     if (quarter := len(after) // 4) == 0:
-        return f"too short to say what becomes of memory after {bound:,} transitions"
+        return None
     first, last = (statistics.median(row[2] for row in some) for some in (after[:quarter], after[-quarter:]))
-    early = [row for row in rows if 10_000 < row[0] <= 20_000] or rows[:1]
+    early = [row for row in rows if 10_000 < row[0] <= 20_000] or after[:quarter]
     then, at_end = (statistics.median(row[3] for row in some) for some in (early, after[-quarter:]))
-    return (
-        f"memory after {bound:,} transitions: {first:.1f} MB in the first quarter, {last:.1f} in the last "
-        f"({100.0 * (last / first - 1.0):+.1f} %), {max(row[2] for row in after):.1f} at most\n"
-        f"cost: {then:.3f} ms up to {early[-1][0]:,}, {at_end:.3f} in the last quarter ({at_end / then:.2f} times)"
-    )
+    return Course((first, last, max(row[2] for row in after)), (then, at_end))
 
 
 def _memory() -> float:
@@ -205,22 +204,51 @@ def fill_cache() -> None:
         _ = [np.empty(size, dtype=np.uint8) for _ in range(_PER_SIZE)]
 
 
-def main() -> None:
-    """Soak the worlds that are named, one after the other."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("worlds", nargs="*", default=["ball"], help=f"of {', '.join(WORLDS)}")
-    parser.add_argument("--steps", type=int, default=1_000_000)
-    parser.add_argument("--every", type=int, default=10_000)
-    parser.add_argument("--hours", type=float, default=float("inf"))
-    parser.add_argument("--history", type=int, help="examples kept per type; default: the learner's")
-    given = parser.parse_args()
+def trial(*, world: str, steps: int, history: int, seed: int) -> list[list[float]]:
+    """`soak` of a world in so many steps, told in `LINES` lines, from a process as quiet as can be."""
     give_back()
     fill_cache()
-    for name in given.worlds:
-        rows = soak(name, given.steps, every=given.every, hours=given.hours, history=given.history)
-        history = ModelConfig().history if given.history is None else given.history
-        print(summary(rows, int(SLACK * history)))
+    return soak(world, steps, every=max(1, steps // LINES), seed=seed, history=history)
 
 
-if __name__ == "__main__":
-    main()
+def _benchmark(world: str) -> Benchmark:
+    def measure(extent: Extent, known: Known) -> Shown:
+        size = {name: extent[name] for name in ("steps", "history")}
+        asked = [{"world": world, "seed": seed, **size} for seed in extent.first(TRAINING_SEEDS)]
+        found = known("relgym.experiments.soak:trial", asked)
+        courses = [
+            told for rows in found if (told := course(rows, int(SLACK * extent["history"]))) is not None
+        ]
+        measures = []
+        if courses:
+            grown = [told.memory[1] / told.memory[0] for told in courses]
+            slower = [told.cost[1] / told.cost[0] for told in courses]
+            measures = [
+                measured("memory at the end, over that when the history was full", LARGER, grown),
+                measured("time a step at the end, over that when laws were known", SLOWER, slower),
+            ]
+        heads = ["transitions", "hours", "memory, MB", "mean, ms", "worst, ms"]
+        notes = [table(heads, [_line(row) for row in rows[:: max(1, len(rows) // 10)]]) for rows in found]
+        if len(courses) < len(found):
+            notes.append("Too short to say what becomes of memory: take more steps, or keep fewer examples.")
+        return Shown(measures, notes)
+
+    return Benchmark(f"{world}: memory, cost and worst step of a long life", measure)
+
+
+def _line(row: list[float]) -> list[Cell]:
+    steps, hours, memory, mean, worst = row
+    return [int(steps), f"{hours:.3f}", f"{memory:.1f}", f"{mean:.3f}", f"{worst:.1f}"]
+
+
+SUITE: Final = Suite(
+    "soak",
+    "Long lives",
+    {world: _benchmark(world) for world in WORLDS},
+    seeds=1,
+    options={
+        "steps": Option(1_000_000, "transitions of a life"),
+        "history": Option(ModelConfig().history, "examples kept per type"),
+    },
+    usual=("ball", "cart"),
+)

@@ -19,6 +19,7 @@ SUITES: Final[Mapping[str, str]] = {
     "strangers": "strangers.suite",
     "transitions": "transitions",
     "outliers": "outliers",
+    "soak": "soak",
     "dyna": "dyna.suite",
     "plan": "plan.suite",
     "speed": "speed.suite",
