@@ -146,8 +146,8 @@ class Course(NamedTuple):
     memory
         MB: medians of the first and the last quarter of what follows the bound, and the most there.
     cost
-        ms a step: in the median from 10,000 to 20,000 transitions, when the laws are known (of shorter lives in the first
-        quarter), and in the last quarter.
+        ms a step: in the median from 10,000 to 20,000 transitions, when the laws are known (of shorter lives in the
+        first quarter), and in the last quarter.
     """
 
     memory: tuple[float, float, float]
