@@ -30,8 +30,8 @@ __all__ = [
 
 _ROOM: Final = "relgym.experiments.chapter4"
 
-_EXPORT: Final = ("relgym.program.source",)
-"""What writes models down as Python, which no section runs."""
+_EXPORT: Final = ("relgym.model.files.upgrade", "relgym.program.source")
+"""What reads files of earlier versions, and what writes models down as Python: no section runs any of it."""
 
 
 def _without(learner: str) -> tuple[str, ...]:

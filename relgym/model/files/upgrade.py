@@ -175,7 +175,7 @@ def _with_say(regression: Any) -> Any:
         nothing, linear, products = (list(map(float, each)) for each in found.pop("left", ()))
         least = map(min, nothing, linear)
         found["say"] = [list(map(_say, nothing, linear)), list(map(_say, least, products))]
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         found["say"] = [[_say(1.0, 0.0) for _ in regression["targets"]]] * 2
     return found
 

@@ -157,7 +157,18 @@ def test_words_of_regressions_count_as_they_did() -> None:
         for kind in found["say"]
     ]
     assert rates == [[[4.0], [], [0.0]], [[1.0], [], []]]  # 2 / 1 lies next to 1 and to 4
-    for unknown in ({"targets": ["x"]}, {"targets": ["x"], "left": []}, {"targets": ["x"], "left": [["?"]]}):
+    for left in (
+        None,
+        [],
+        [["?"]],
+        [[1.0], [1.0]],
+        [[10**400], [1.0], [1.0]],
+        {"x": 1.0},
+        [{}, {}, {}],
+        "left",
+        3,
+    ):
+        unknown = {"targets": ["x"]} | ({} if left is None else {"left": left})
         found = upgraded({"regressions": {"self": unknown}}, 3)["regressions"]["self"]
         assert found["say"] == [[[1.0] + [0.0] * (len(RATES) - 1)]] * 2
 
