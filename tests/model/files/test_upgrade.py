@@ -164,7 +164,6 @@ def test_words_of_regressions_count_as_they_did() -> None:
         [[1.0], [1.0]],
         [[10**400], [1.0], [1.0]],
         {"x": 1.0},
-        [{}, {}, {}],
         "left",
         3,
     ):
