@@ -100,7 +100,7 @@ def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
     assert not one.informed
     kept = strollers(1)[0].before
     assert one.value == pytest.approx(kept["self"]["v"] + regressed(model, kept))
-    assert abs(regressed(model, kept)) < 0.05  # of noise of 1
+    assert abs(regressed(model, kept)) < 0.03  # of noise of 1
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -187,7 +187,7 @@ def test_what_depends_on_what_is_kept_follows_from_it() -> None:
     assert said["self", "x"].outcome is Outcome.DEPENDS
     v = 3.0 + regressed(model, scene)
     assert said.scene["self"].values.tolist() == pytest.approx([2.0 + v, v])
-    assert v == pytest.approx(3.0, abs=0.1)  # of noise of 1 regressions make next to nothing
+    assert v == pytest.approx(3.0, abs=0.075)  # of noise of 1 regressions make next to nothing
     batch = model.predict_batch(scene.layout, scene.vector[None])
     assert batch.vectors[0].tobytes() == said.scene.vector.tobytes()
 
