@@ -126,11 +126,13 @@ def _extended(
     x = slots.matrix(table, order[: stages[0]])
     flags = _flags(x) & flagged
     own = exact and not any(role.terms for role in cluster.mode.open_roles)
-    for at in range(x.shape[1]):
+    leads = range(len(both) - 1, max(len(both) - 1 - fresh, len(members) - 1), -1)
+    if not leads:
+        return None
+    for at in np.flatnonzero(_constant(x[: len(members)], x[leads.stop + 1 :])).tolist():
         if at in had or not (flags[at] or own):
             continue
         told = _told(known, signature, int(order[at])) if flags[at] else None
-        leads = range(len(both) - 1, max(len(both) - 1 - fresh, len(members) - 1), -1)
         off = x[:, at] - float(np.median(x[: len(members), at]))
         tried = (_agreeing(off, left, len(members), k, tolerance, told) for k in leads)
         agree = next((rows for rows in tried if rows is not None), None)
@@ -152,6 +154,14 @@ def is_flag(y: NDArray[np.float64]) -> bool:
 def _flags(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which columns hold nothing but 0 and 1."""
     found: NDArray[np.bool_] = ((values == 0.0) | (values == 1.0)).all(axis=0)
+    return found
+
+
+def _constant(members: NDArray[np.float64], new: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which columns may be constant among a mode's members and not in some new row: others needn't be looked at."""
+    low, high = members.min(axis=0), members.max(axis=0)
+    reach = np.maximum(new.max(axis=0) - low, high - new.min(axis=0))  # no new row lies further from their median
+    found: NDArray[np.bool_] = (reach > 0.0) & (high - low <= 2.0 * CONSTANT * reach)
     return found
 
 
