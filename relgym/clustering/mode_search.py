@@ -127,14 +127,15 @@ class ModeSearch:
         search.waiting += 1
         slots = table.signatures[signature]
         patience = self._patience(search, bool(slots.features), bool(slots.features or slots.chained))
-        if search.waiting <= patience or self._hunt is not None or not budget.left:
+        if search.waiting <= patience or self._hunt is not None:
             if extended(
                 population.known(table), signature, self._newest(table, signature), fresh=1, flags=True
             ):
                 self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)
             return
         self._hunt = Hunt(signature, search.waiting)
-        self.pursue(table, budget)
+        if budget.left:  # else its turn comes
+            self.pursue(table, budget)
 
     def search_all(self, table: ExampleTable, budget: Budget) -> None:
         """Search where all examples are news; else the next one would begin that, with itself in each sample."""
@@ -151,6 +152,8 @@ class ModeSearch:
         while (hunt := self._hunt) is not None:
             search = self._searches.setdefault(hunt.signature, Search())
             if hunt.task is None:
+                if hunt.left == MOST_DISCOVERIES:  # it begins: what came while it waited for its turn is news, too
+                    hunt.fresh = search.waiting
                 pool = self._pool(table, hunt.signature)
                 if not hunt.left or len(pool) < self.population.needed:  # not a failure: nothing was searched
                     self._give_up(table, search, pool)

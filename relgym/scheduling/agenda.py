@@ -59,7 +59,11 @@ class Budget:
 
 
 class Agenda:
-    """What was earned and not yet spent, and whose work is under way, the longest waiting first.
+    """What was earned and not yet spent, and whose work is under way: whom least was spent on first.
+
+    Nobody knows how long a search will take, but most are short, and some never find anything. Who has had least goes
+    first (least attained service: Nuyens & Wierman 2008): what is easy to find is found at once, whoever else searches
+    in vain; of equals the longest waiting.
 
     Parameters
     ----------
@@ -76,23 +80,30 @@ class Agenda:
     >>> budget = agenda.open()
     >>> budget.left
     40
-    >>> budget.spend(50); agenda.close(budget, ["a"])
+    >>> budget.spend(50); agenda.spent_on("a", 50); agenda.close(budget, ["a", "b"])
     >>> agenda.open().left, agenda.waiting
-    (20, ('a',))
+    (20, ('b', 'a'))
     """
 
     def __init__(self, *, earned: int, most: int, saved: int) -> None:
         self.earned, self.most, self.limit = earned, most, max(saved, earned)
         self.saved = saved
         self.waiting: tuple[Hashable, ...] = ()
+        self._had: dict[Hashable, int] = {}
 
     def open(self) -> Budget:
         """The budget of a step that begins."""
         self.saved = min(self.limit, self.saved + self.earned)
         return Budget(max(0, min(self.most, self.saved)))
 
+    def spent_on(self, whom: Hashable, cells: int) -> None:
+        """Take note of work done for one of those who wait; it is forgotten once that waits no longer."""
+        self._had[whom] = self._had.get(whom, 0) + cells
+
     def close(self, budget: Budget, waiting: Iterable[Hashable]) -> None:
-        """A step ends: pay for it, and put whose work is under way now behind those that wait already."""
+        """A step ends: pay for it, and put in order whose work is under way now."""
         self.saved -= budget.spent
-        now = tuple(waiting)
-        self.waiting = (*(k for k in self.waiting if k in now), *(k for k in now if k not in self.waiting))
+        now = dict.fromkeys(waiting)
+        self._had = {k: cells for k, cells in self._had.items() if k in now}
+        queue = [*(k for k in self.waiting if k in now), *(k for k in now if k not in self.waiting)]
+        self.waiting = tuple(sorted(queue, key=lambda k: self._had.get(k, 0)))

@@ -56,6 +56,18 @@ def test_what_waits_longest_comes_first() -> None:
     assert agenda.waiting == ("c", "b")
 
 
+def test_who_had_least_comes_first() -> None:
+    agenda = Agenda(earned=1, most=1, saved=1)
+    agenda.close(agenda.open(), ["long", "longer"])
+    agenda.spent_on("longer", 9)
+    agenda.spent_on("long", 5)
+    agenda.close(agenda.open(), ["long", "longer", "new"])
+    assert agenda.waiting == ("new", "long", "longer")
+    agenda.close(agenda.open(), ["long", "new"])
+    agenda.close(agenda.open(), ["long", "longer", "new"])  # begun again: what an earlier search took doesn't count
+    assert agenda.waiting == ("new", "longer", "long")
+
+
 @given(
     st.lists(st.integers(0, 80), max_size=40),
     st.integers(1, 20),

@@ -145,7 +145,7 @@ def _nothing_waits(parts: Parts) -> bool:
 
 
 def _go_on(parts: Parts, budget: Budget) -> None:
-    """Go on with what is under way: what is sure to end soon, then searches for modes, the oldest first."""
+    """Go on with what is under way: what is sure to end soon, then searches for modes, those that had least first."""
     turns = [
         (turn, k) for k, t in enumerate(parts.targets) if (turn := parts.models[t].clusterer.turn) is not None
     ]
@@ -158,8 +158,12 @@ def _go_on(parts: Parts, budget: Budget) -> None:
             model.reconsider(table, budget)
     searches = budget.part(SEARCHES)
     for waiting in parts.agenda.waiting:
+        if not searches.left:
+            return
         if isinstance(waiting, Target) and waiting in parts.models:
+            before = searches.spent
             parts.models[waiting].go_on(parts.tables[waiting.type], searches)
+            parts.agenda.spent_on(waiting, searches.spent - before)
 
 
 def _inquire(parts: Parts, budget: Budget) -> None:
