@@ -157,6 +157,7 @@ def find_mode(
     rows: NDArray[np.intp] | None = None,
     apart: NDArray[np.integer] | None = None,
     orders: NDArray[np.intp] | None = None,
+    present: int | None = None,
 ) -> Steps[Consensus | None]:
     """Search rows of one slot signature for a function that enough of them obey.
 
@@ -180,6 +181,8 @@ def find_mode(
     orders
         Orders in which objects may stand (`relgym.clustering.exchange`); where there are any, functions in which these
         have a say are looked for in all of them, too. What such a one explains, it explains in the order that suits.
+    present
+        The column of the property's present value: where that nothing changes is said in fewer bits, it is what is found.
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = searched(len(y), fresh, rng) if rows is None else rows
@@ -213,7 +216,7 @@ def find_mode(
                 part = rows if lacking else None
                 told = yield from _law_of(x, y, found, part, columns, stages[0], needed, scale, config)
                 if told is not None:
-                    return told
+                    return told if present is None else _simplest(x, y, told, present, scale)
         if orders is not None and stages[0] < columns <= WIDE:
             fresher = int((rows >= len(y) - fresh).sum())
             found = yield from _in_any_order(
@@ -233,6 +236,26 @@ def find_mode(
                 inliers[rows] = found.inliers
                 return Consensus(found.fit, inliers)
     return None
+
+
+def _simplest(
+    x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, present: int, scale: Scale
+) -> Consensus:
+    """A function, or that nothing changes if that takes fewer bits: it has no number that must be told.
+
+    Told of a function are its numbers, the values of the rows that it doesn't explain while the other one does, and what
+    both leave of the others; each number and each value in so many bits as it takes to tell values apart. So of a flag
+    that was set once, when another one was set, it isn't said that it is the other one.
+    """
+    stays = np.abs(y - x[:, present]) <= scale.tolerance
+    both, bits = stays & found.inliers, verifying_bits(y, scale)
+    left = np.square(y[both] - found.fit.predict(x[both])) - np.square(y[both] - x[both, present])
+    noise = float(left.sum()) / (2.0 * math.log(2.0) * scale.sigma**2)
+    numbers = len(found.fit.weights) + (found.fit.intercept != 0.0)
+    saved = bits * (numbers + int(stays.sum()) - found.size) + noise
+    if saved > 0.0 or (saved == 0.0 and numbers):
+        return Consensus(LinearFit((present,), (1.0,), 0.0, 0.0), stays)
+    return found
 
 
 def _law_of(

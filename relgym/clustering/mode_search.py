@@ -190,6 +190,8 @@ class ModeSearch:
         rows = population.rows[pool]
         part = searched(len(pool), hunt.fresh, self._rng)
         several = len(np.unique(table.strata[rows[part]])) > 1
+        property_ = population.target.property
+        at = np.flatnonzero(order == slots.column(0, property_)) if slots.has(0, property_) else order[:0]
         hunt.order = order
         hunt.task = Task(
             find_mode,
@@ -206,6 +208,7 @@ class ModeSearch:
             rows=part,
             apart=table.differences(rows[part]) if several else None,
             orders=orders_of(slots, order, population.config.draws),
+            present=int(at[0]) if len(at) else None,
         )
         budget.spend(CALL + len(rows) * len(order) + several * len(part) ** 2)
 

@@ -155,6 +155,51 @@ def test_a_term_that_few_rows_do_not_show_is_found_from_near_misses(rng: np.rand
     assert 298 <= found.size <= 306
 
 
+@pytest.mark.parametrize(("exceptions", "column"), [(1, 0), (4, 1)])
+def test_that_nothing_changes_is_said_in_fewer_bits_than_another_flag(
+    rng: np.random.Generator, exceptions: int, column: int
+) -> None:
+    # A flag that was set once when the other one was is no copy of it; one that is set whenever the other one is, is.
+    x = np.repeat(rng.integers(0, 2, size=(60, 1)), 2, axis=1).astype(float)
+    y = x[:, 0].copy()
+    changed = np.flatnonzero(y == 1.0)[:exceptions]
+    x[changed, 0] = 0.0
+    found = find_mode(
+        x,
+        y,
+        np.zeros(60, dtype=int),
+        stages=(2,),
+        fresh=60,
+        scale=Scale(1e-12, 4.0, 6.0),
+        config=CONFIG,
+        rng=rng,
+        present=0,
+    )
+    assert found is not None
+    assert found.fit.columns == (column,)
+    assert found.fit.weights == pytest.approx((1.0,))
+    assert found.size == (60 if column else 60 - exceptions)
+
+
+def test_what_drifts_within_the_noise_is_not_said_to_stay(rng: np.random.Generator) -> None:
+    # Each row may be one of something that stays; all of them together aren't.
+    x = rng.normal(size=(300, 1))
+    y = x[:, 0] + 0.02 + rng.normal(scale=0.01, size=300)
+    found = find_mode(
+        x,
+        y,
+        np.zeros(300, dtype=int),
+        stages=(1,),
+        fresh=300,
+        scale=Scale(0.01, 4.0, 6.0),
+        config=CONFIG,
+        rng=rng,
+        present=0,
+    )
+    assert found is not None
+    assert found.fit.intercept == pytest.approx(0.02, abs=2e-3)
+
+
 def test_fresh_rows_may_outnumber_those_left_to_search(rng: np.random.Generator) -> None:
     # Of 900 rows that no search has seen some have become a mode's tail, and 600 are left.
     x = rng.normal(size=(600, 3))

@@ -3,12 +3,14 @@
 A truck that friction stops stands still: ``v' = max(0, v + (F - friction) / M)``. Among the modes that is a
 constant one, ``v' = 0``, and *when* it holds is a question about the value that the right one of the other
 modes would give, with its roles filled, not about the scene. So it takes no part in the vote: the others are
-ranked without it, and their winner's value is cut off at the limit.
+ranked without it, and their winner's value is cut off at the limit. So the examples of a limit are examples of the
+modes that would have led beyond it, and of no other: a counter that stays at 0 until it starts again shows, as long as
+it stays, that it doesn't start.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -66,6 +68,43 @@ class Limits:
         under, over = values < self.least, values > self.most
         values[under], modes[under] = self.least, self.low
         values[over], modes[over] = self.most, self.high
+
+    def credited(
+        self,
+        labels: NDArray[np.integer],
+        fits: NDArray[np.bool_],
+        values: NDArray[np.float64],
+        voters: Sequence[int],
+        slack: float,
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Give the examples of limits to the modes that would have led beyond them.
+
+        Parameters
+        ----------
+        labels
+            Mode of each example, shape ``(n,)``.
+        fits, values
+            Whether each voting mode explains it, and what it says, shape ``(n, len(voters))``; NaN: its roles are open.
+        voters
+            Ids of the modes that take part in the vote, the first that leads beyond a limit is taken for the mode.
+        slack
+            Distance from a limit that counts as having reached it.
+
+        Returns
+        -------
+        labels, fits
+            New arrays; other examples are as they were.
+        """
+        labels, fits = labels.astype(np.int64), fits.copy()
+        for mode, beyond in (
+            (self.low, values <= self.least + slack),
+            (self.high, values >= self.most - slack),
+        ):
+            held = np.flatnonzero((labels == mode) & (mode != NOISE) & beyond.any(axis=1))
+            if len(held):
+                fits[held] = beyond[held]
+                labels[held] = np.asarray(voters)[beyond[held].argmax(axis=1)]
+        return labels, fits
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back: id and value of each bound there is."""

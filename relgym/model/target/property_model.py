@@ -200,6 +200,9 @@ class PropertyModel:
             self._follow(table)
         fits = np.array([i in report.fits for i in self.classifier.modes], dtype=bool)
         values = np.array(self.functions.values_one(signature, x[0].tolist(), self.classifier.modes))
+        if mode in self.limits:
+            given, credit = self._credited(np.array([mode]), fits[None], values[None], self.classifier.modes)
+            mode, fits = int(given[0]), credit[0]
         assigned = UNKNOWN if mode == NOISE or self.bounds(mode) else mode
         played = self.functions.played_one(table, seen.row, mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
@@ -341,6 +344,8 @@ class PropertyModel:
         known, fits = self.clusterer.fits(table, number)
         shown = np.array([bool(fits[0, known.index(i)]) for i in modes], dtype=bool)
         values = self.functions.values_many(table, self.clusterer.rows[number], modes)[0]
+        labels, credit = self._credited(np.array([assigned]), shown[None], values[None], modes)
+        assigned, shown = int(labels[0]), credit[0]
         played = self.functions.played(table, number, assigned)[0].tolist()
         label = assigned if assigned in modes else UNKNOWN
         self.classifier.exemplars.add(example, label, shown, values, roles=played, weight=weight)
@@ -440,13 +445,30 @@ class PropertyModel:
         ids = tuple(i for i in known if not self.bounds(i))
         fits = fits[:, [not self.bounds(i) for i in known]]
         values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
-        labels = self.clusterer.labels[numbers].astype(np.int64)
+        labels, fits = self._credited(self.clusterer.labels[numbers], fits, values, ids)
         self.calibration.keep(ids)
         self.amended = set(ids) if self.limits != before else self.amended.intersection(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self.functions.recast(table, self.classifier.exemplars)
         self.casting.recall(self.classifier.exemplars)
+
+    def _credited(
+        self,
+        labels: NDArray[np.integer],
+        fits: NDArray[np.bool_],
+        values: NDArray[np.float64],
+        modes: Sequence[int],
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Labels and fits with the examples of limits given to modes that lead beyond them, the commonest first."""
+        clusters = self.clusterer.clusters
+        order = sorted(range(len(modes)), key=lambda k: (-clusters[modes[k]].fitted, modes[k]))
+        labels, found = self.limits.credited(
+            labels, fits[:, order], values[:, order], [modes[k] for k in order], self.clusterer.scale.tolerance
+        )
+        fits = np.empty_like(found)
+        fits[:, order] = found
+        return labels, fits
 
     def _find_stops(self, table: ExampleTable) -> Stops:
         given = [prop for name, prop in self.conditions.pairs if name == self.target.type]

@@ -114,3 +114,37 @@ def test_cut_off_by_hand() -> None:
     assert modes.tolist() == [3, 0, 2]
     assert Limits.from_json(limits.to_json()) == limits
     assert 3 in limits and 1 not in limits and 0 not in limits
+
+
+def test_what_stays_at_a_limit_does_not_start_again() -> None:
+    # A counter goes down by 4, stays at 0, and starts at 60 again when the bell rings: while it stays it shows that
+    # it doesn't start, so what tells when it does is the bell.
+    schema = SceneSchema(
+        (ObjectType("clock", ("count", "bell")), ObjectType("action", ("a",))),
+        (("clock", "clock"), ("action", "action")),
+        targets=(Target("clock", "count"),),
+    )
+    rng = np.random.default_rng(3)
+    model, count = WorldModel(schema, LATER), 60.0
+    for _ in range(1500):
+        bell = float(count == 0.0 and rng.random() < 0.05)
+        before = schema.scene({"clock": [count, bell], "action": [rng.random()]})
+        count = 60.0 if bell else max(0.0, count - 4.0)
+        model.learn_one(Transition(before, schema.scene({"clock": [count, 0.0], "action": [0.0]})))
+    model.finish()
+    for start, bell, then in [(0.0, 0.0, 0.0), (0.0, 1.0, 60.0), (40.0, 0.0, 36.0), (2.0, 0.0, 0.0)]:
+        scene = schema.scene({"clock": [start, bell], "action": [0.5]})
+        assert model.predict_one(scene)["clock", "count"].value == pytest.approx(then), (start, bell)
+
+
+def test_examples_at_a_limit_are_those_of_the_modes_that_lead_beyond_it() -> None:
+    limits = Limits(low=4, least=0.0)
+    labels, fits = limits.credited(
+        np.array([4, 4, 7, 4]),
+        np.array([[False, False], [False, False], [True, False], [False, False]]),
+        np.array([[-3.0, 5.0], [-1.0, -2.0], [6.0, 5.0], [np.nan, 1.0]]),
+        (7, 9),
+        1e-9,
+    )
+    assert labels.tolist() == [7, 7, 7, 4]
+    assert fits.tolist() == [[True, False], [True, True], [True, False], [False, False]]
