@@ -522,6 +522,9 @@ def _enough_combinations(
     """Whether slowly changing columns take enough combinations of values to support their weights."""
     if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < 1e-9:
         return True  # persistence has no free parameter
+    used = np.unique(x[:, list(fit.columns)], axis=0)
+    if fit.columns and len(used) <= len(fit.columns) + (fit.intercept != 0.0):
+        return False  # as many numbers as values to be told: a table of constants
     few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
     lively = [c for c in few if _lively(x[:, c])]
     if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:

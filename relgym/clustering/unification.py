@@ -104,17 +104,14 @@ def _persist(
     scale: Scale,
     config: ClusteringConfig,
 ) -> bool:
-    """Whether on each side the property keeps its value, and isn't at rest.
+    """Whether on each side the property keeps its value, and isn't at rest on both.
 
-    Of two constants ``v' = c`` this is the general law (§3.2.5). It has no parameter to be fitted, so that a
-    few examples which a side owes to coincidence (v arrives at c) can't spoil it.
+    Of two constants ``v' = c`` this is the general law (§3.2.5), and 0 is one of them as well. It has no parameter to
+    be fitted, so that a few examples which a side owes to coincidence (v arrives at c) can't spoil it.
     """
-    for side in sides:
-        kept = np.abs(y[side] - present[rows[side]]) <= scale.tolerance
-        moving = np.abs(y[side]) > scale.tolerance
-        if kept.mean() < config.unify_ratio or moving.mean() < 0.5:
-            return False
-    return True
+    kept = [(np.abs(y[side] - present[rows[side]]) <= scale.tolerance).mean() for side in sides]
+    moving = [(np.abs(y[side]) > scale.tolerance).mean() for side in sides]
+    return bool(min(kept) >= config.unify_ratio and max(moving) >= 0.5)
 
 
 def unified_family(
