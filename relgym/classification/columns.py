@@ -1,4 +1,8 @@
-"""Arrays that share their rows and grow: by doubling in rows, as needed along other named axes."""
+"""Arrays that share their rows and grow: by doubling in rows, as needed along other named axes.
+
+What several learners keep alike is held once: a pool (`relgym.classification.rows`) can stand behind an array, and who
+reads or writes it sees no difference.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,18 @@ import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.classification.rows import Gathered, RowPool
 from relgym.config.constants import FIRST_ROOM
 
 __all__ = ["Column", "Columns"]
+
+_NONE: Final[Mapping[str, RowPool]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +35,7 @@ class Column:
 
 
 class Columns:
-    """Named arrays of shape ``(size, *axes)``; ``columns[name]`` is a view of the rows in use.
+    """Named arrays of shape ``(size, *axes)``; ``columns[name]`` is a view of the rows in use (with a pool, a copy).
 
     Parameters
     ----------
@@ -35,29 +43,46 @@ class Columns:
         Description of each array.
     sizes
         Length of every named axis to begin with.
+    pools
+        Pools that hold the first numbers of all rows of an array, by its name. The array is of floats and has one more
+        axis, at least as long as those rows; what is written to it is as long as the axis.
     """
 
-    def __init__(self, columns: Mapping[str, Column], sizes: Mapping[str, int]) -> None:
+    def __init__(
+        self, columns: Mapping[str, Column], sizes: Mapping[str, int], pools: Mapping[str, RowPool] = _NONE
+    ) -> None:
         self.columns = dict(columns)
         self.sizes = dict(sizes)
         self.size = 0
-        self._arrays = {name: self._empty(name, FIRST_ROOM) for name in self.columns}
+        self._pools = dict(pools)
+        self._arrays: dict[str, NDArray[Any]] = {}  # of those with a pool what comes behind its rows
+        self._held: dict[str, NDArray[np.int64]] = {}  # their numbers in it; -1 for none
+        self._clear(FIRST_ROOM)
 
     def __len__(self) -> int:
         return self.size
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return self._arrays[name][: self.size]
+        return self.gathered(name).whole if name in self._pools else self._arrays[name][: self.size]
 
     def __setitem__(self, name: str, value: NDArray[Any]) -> None:
         """Replace a whole array; its axes may change length, its rows may not."""
         column = self.columns[name]
         self.sizes |= dict(zip(column.axes, value.shape[1:], strict=True))
         self._arrays[name] = self._empty(name, self._capacity())
-        self._arrays[name][: self.size] = value
+        if name not in self._pools:
+            self._arrays[name][: self.size] = value
+            return
+        for row, numbers in enumerate(value):
+            self._hold(name, row, numbers)
+
+    def gathered(self, name: str, rows: slice = slice(None)) -> Gathered:
+        """Some rows of an array with a pool, put together when they are read; valid until they change."""
+        numbers, more = self._held[name][: self.size], self._arrays[name][: self.size]
+        return Gathered(self._pools[name], numbers[rows], more[rows])
 
     def row_bytes(self, sizes: Mapping[str, int]) -> int:
-        """Memory of a row if named axes are at least so long, in bytes."""
+        """Memory of a row if named axes are at least so long, in bytes; as if there were no pools."""
         lengths = {axis: max(length, sizes.get(axis, 0)) for axis, length in self.sizes.items()}
         return sum(
             np.dtype(column.dtype).itemsize * math.prod(lengths[axis] for axis in column.axes)
@@ -76,7 +101,9 @@ class Columns:
         known = self._arrays
         others: dict[str, NDArray[Any]] = {}
         for name, value in values.items():
-            if getattr(value, "shape", ()) == known[name].shape[1:]:
+            if name in self._pools:
+                self._hold(name, row, value)
+            elif getattr(value, "shape", ()) == known[name].shape[1:]:
                 known[name][row] = value
             else:
                 others[name] = np.asarray(value)
@@ -92,6 +119,10 @@ class Columns:
 
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Keep only these rows, in this order."""
+        for name, pool in self._pools.items():
+            held = self._held[name][: self.size]
+            pool.release(np.delete(held, rows).tolist())
+            held[: len(rows)], held[len(rows) :] = held[rows], -1
         for array in self._arrays.values():
             array[: len(rows)] = array[rows]
         self.size = len(rows)
@@ -103,20 +134,35 @@ class Columns:
 
     def load(self, data: Mapping[str, Any]) -> None:
         """Restore what `to_dict` gave; the columns must be the same."""
+        self.keep(np.empty(0, dtype=np.intp))  # pools are to know
         self.size, self.sizes = int(data["size"]), dict(data["sizes"])
-        capacity = max(FIRST_ROOM, self.size)
-        for name in self.columns:
-            self._arrays[name] = self._empty(name, capacity)
-            self[name][...] = _decode(data["arrays"][name], self[name])
+        self._clear(max(FIRST_ROOM, self.size))
+        for name, column in self.columns.items():
+            shape = (self.size, *(self.sizes[axis] for axis in column.axes))
+            self[name] = _decode(data["arrays"][name], np.dtype(column.dtype), shape)
+
+    def _clear(self, capacity: int) -> None:
+        """Have room for so many rows, of which none is written."""
+        self._arrays = {name: self._empty(name, capacity) for name in self.columns}
+        self._held = {name: np.full(capacity, -1, dtype=np.int64) for name in self._pools}
+
+    def _hold(self, name: str, row: int, value: NDArray[np.float64]) -> None:
+        """Set a row of an array with a pool."""
+        pool, held = self._pools[name], self._held[name]
+        self._arrays[name][row] = value[pool.width :]
+        before, held[row] = int(held[row]), pool.hold(value[: pool.width])
+        if before >= 0:
+            pool.release((before,))
 
     def _capacity(self) -> int:
         return len(next(iter(self._arrays.values())))
 
     def _empty(self, name: str, capacity: int) -> NDArray[Any]:
         column = self.columns[name]
-        return np.full(
-            (capacity, *(self.sizes[axis] for axis in column.axes)), column.fill, dtype=column.dtype
-        )
+        shape = [self.sizes[axis] for axis in column.axes]
+        if name in self._pools:
+            shape = [shape[0] - self._pools[name].width]
+        return np.full((capacity, *shape), column.fill, dtype=column.dtype)
 
     def _grow(self, values: Mapping[str, NDArray[Any]]) -> None:
         before = dict(self.sizes)
@@ -131,6 +177,9 @@ class Columns:
             new = self._empty(name, capacity)
             new[tuple(slice(min(a, b)) for a, b in zip(old.shape, new.shape, strict=True))] = old[:capacity]
             self._arrays[name] = new
+        for name, held in self._held.items():
+            self._held[name] = np.full(capacity, -1, dtype=np.int64)
+            self._held[name][: self.size] = held[: self.size]
 
 
 def _encode(array: NDArray[Any]) -> str:
@@ -138,9 +187,9 @@ def _encode(array: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(packed).tobytes()).decode("ascii")
 
 
-def _decode(text: str, like: NDArray[Any]) -> NDArray[Any]:
+def _decode(text: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     raw = base64.b64decode(text)
-    if like.dtype == np.bool_:
-        bits = np.unpackbits(np.frombuffer(raw, dtype=np.uint8), count=like.size)
-        return bits.astype(np.bool_).reshape(like.shape)
-    return np.frombuffer(raw, dtype=like.dtype).reshape(like.shape)
+    if dtype == np.bool_:
+        bits = np.unpackbits(np.frombuffer(raw, dtype=np.uint8), count=math.prod(shape))
+        return bits.astype(np.bool_).reshape(shape)
+    return np.frombuffer(raw, dtype=dtype).reshape(shape)

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
+from relgym.classification.rows import Gathered, RowPool
 from relgym.config import ClassificationConfig
 from relgym.config.constants import LEAST_EXEMPLARS
 from relgym.mixing import GOLDEN, mixed_one
@@ -90,6 +91,9 @@ class Exemplars:
         Names of what the examples hold.
     config
         Bounds.
+    pool
+        Holds the first own features of the examples, those of others of the same objects, too; default: one that nobody
+        else uses.
 
     Attributes
     ----------
@@ -109,7 +113,9 @@ class Exemplars:
     reservoir's choices are hashes of key and count.
     """
 
-    def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
+    def __init__(
+        self, vocabulary: Vocabulary, config: ClassificationConfig, pool: RowPool | None = None
+    ) -> None:
         self.vocabulary = vocabulary
         self.config = config
         self.modes: tuple[int, ...] = ()
@@ -120,7 +126,8 @@ class Exemplars:
             "A": vocabulary.own,
         }
         sizes = {name: len(names) for name, names in lengths.items()}
-        self.columns = Columns(COLUMNS, sizes | {"K": 1, "K2": 1, "M": 0, "P": 0})
+        pool = RowPool(sizes["A"]) if pool is None else pool
+        self.columns = Columns(COLUMNS, sizes | {"K": 1, "K2": 1, "M": 0, "P": 0}, {"own": pool})
         self.version = 0
         self._cells: list[_Cell] = []
         self._index: dict[tuple[int, bytes], int] = {}
@@ -136,6 +143,11 @@ class Exemplars:
     def rows(self) -> NDArray[np.int64]:
         """History row of the example in each slot."""
         return self.columns["row"]
+
+    @property
+    def own(self) -> Gathered:
+        """Own features of the example in each slot, put together when they are read; valid until they change."""
+        return self.columns.gathered("own")
 
     @property
     def assigned(self) -> NDArray[np.int64]:
@@ -252,6 +264,10 @@ class Exemplars:
     def key_of(self, slot: int) -> bytes:
         """Relational state of the example in a slot."""
         return self._cells[int(self.columns["cell"][slot])].key
+
+    def own_of(self, slot: int) -> Floats:
+        """Own features of the example in a slot."""
+        return self.columns.gathered("own", slice(slot, slot + 1))[0]
 
     def widen(self, vocabulary: Vocabulary, own: Floats) -> None:
         """Other own features: their names, and their values for every slot, shape ``(n, len(vocabulary.own))``."""

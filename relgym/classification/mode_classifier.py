@@ -18,6 +18,7 @@ from relgym.classification.learning import Lesson
 from relgym.classification.owners import Owners
 from relgym.classification.pairs import PairState, covered_by, pair_labels
 from relgym.classification.ranking import Ranking, RankingBatch, Verdict
+from relgym.classification.rows import RowPool
 from relgym.classification.views import Context, Scope, View
 from relgym.classification.voting import Voting
 from relgym.config import ClassificationConfig
@@ -34,6 +35,8 @@ class ModeClassifier:
         Names of what examples hold.
     config
         Settings.
+    pool
+        Holds own features of the examples that are remembered: see `Exemplars`.
 
     Attributes
     ----------
@@ -50,10 +53,12 @@ class ModeClassifier:
     summation.
     """
 
-    def __init__(self, vocabulary: Vocabulary, config: ClassificationConfig) -> None:
+    def __init__(
+        self, vocabulary: Vocabulary, config: ClassificationConfig, pool: RowPool | None = None
+    ) -> None:
         self.vocabulary = vocabulary
         self.config = config
-        self.exemplars = Exemplars(vocabulary, config)
+        self.exemplars = Exemplars(vocabulary, config, pool)
         self.counts: dict[int, float] = {}
         self._pairs: dict[tuple[int, int], PairState] = {}
         self._view: tuple[int, View, Floats] | None = None
@@ -283,9 +288,11 @@ class ModeClassifier:
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], config: ClassificationConfig) -> ModeClassifier:
+    def from_dict(
+        cls, data: dict[str, Any], config: ClassificationConfig, pool: RowPool | None = None
+    ) -> ModeClassifier:
         """Inverse of `to_dict`."""
-        self = cls(Vocabulary.from_dict(data["vocabulary"]), config)
+        self = cls(Vocabulary.from_dict(data["vocabulary"]), config, pool)
         if data["exemplars"] is not None:
             self.exemplars.load(data["exemplars"])
         else:

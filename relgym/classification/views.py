@@ -20,6 +20,7 @@ from relgym.classification.examples import (
     turned,
 )
 from relgym.classification.exemplars import Exemplars
+from relgym.classification.rows import Gathered
 from relgym.config import ClassificationConfig
 from relgym.logic.clause import Clause
 from relgym.logic.csp import matches
@@ -111,7 +112,7 @@ class View:
     approached: Bools
     close: Bools
     pair: Floats
-    own: Floats
+    own: Floats | Gathered
     target: _Rows
     modes: tuple[int, ...]
     values: Floats
@@ -129,7 +130,7 @@ class View:
                 c["approached"],
                 c["close"],
                 c["pair"],
-                c["own"],
+                exemplars.own,
                 c["target"],
             ),
             modes=exemplars.modes,

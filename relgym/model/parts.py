@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
+from relgym.classification.rows import RowPool
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
@@ -76,6 +77,8 @@ class Parts:
         Targets of each type, in causal order, and their models.
     tables
         Regression rows by type name, shared by all targets of a type.
+    pools
+        What their classifiers remember of the numbers of objects, by type name.
     regressions
         What least squares on everything says, by type name.
     perception
@@ -113,6 +116,7 @@ class Parts:
         )
         self.models: dict[Target, PropertyModel] = {}
         self.tables: dict[str, ExampleTable] = {}
+        self.pools: dict[str, RowPool] = {}
         self.regressions: dict[str, Regression] = {}
         self.looks: list[Look] = []
         self.inquiry: Inquiry | None = None
@@ -231,7 +235,9 @@ class Parts:
             )
         if self.open and t.name == TASK:
             target = replace(target, given=self._bearing_on(target))
-        self.models[target] = PropertyModel(target, self.perception.vocabulary(t), self.config, self.schema)
+        vocabulary = self.perception.vocabulary(t)
+        pool = self.pools.setdefault(target.type, RowPool(len(vocabulary.own)))
+        self.models[target] = PropertyModel(target, vocabulary, self.config, self.schema, pool)
         if self.laws is not None:
             self.laws.mark(self.models)
         targets = (*self.targets, target)

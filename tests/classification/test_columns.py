@@ -7,6 +7,7 @@ import json
 import numpy as np
 
 from relgym.classification.columns import Column, Columns
+from relgym.classification.rows import RowPool
 
 _SPEC = {
     "flags": Column("bool", ("K",)),
@@ -67,3 +68,53 @@ def test_json_round_trip_is_exact() -> None:
         np.testing.assert_array_equal(again[name], columns[name])
     again.append()
     assert len(again) == 4
+
+
+_OWN = {"own": Column("float64", ("A",), float("nan")), "id": Column("int64")}
+
+
+def _pooled(pool: RowPool, values: list[list[float]]) -> Columns:
+    columns = Columns(_OWN, {"A": 3}, {"own": pool})
+    for number, value in enumerate(values):
+        columns.write(columns.append(), {"own": np.array(value), "id": number})
+    return columns
+
+
+def test_a_pool_behind_an_array_is_not_seen() -> None:
+    pool = RowPool(2)
+    values = [[1.0, 2.0, 3.0], [1.0, 2.0, 4.0], [5.0, 6.0, 7.0]]
+    columns, others = _pooled(pool, values), _pooled(pool, values[:1])
+    assert columns["own"].tolist() == values
+    assert columns.gathered("own", slice(1, 2))[0].tolist() == values[1]
+    assert len(pool) == 2
+    columns.write(0, {"own": np.array([8.0, 9.0, 0.0]), "id": 7})
+    columns.keep(np.array([0, 1]))
+    assert columns["own"].tolist() == [[8.0, 9.0, 0.0], values[1]]
+    assert (others["own"].tolist(), len(pool)) == (values[:1], 2)
+    columns["own"] = np.array([[1.0, 2.0], [3.0, 4.0]])
+    assert columns["own"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    columns.keep(np.empty(0, dtype=np.intp))
+    others.keep(np.empty(0, dtype=np.intp))
+    assert len(pool) == 0
+
+
+def test_rows_in_a_pool_survive_growth() -> None:
+    pool = RowPool(2)
+    values = [[float(k), 1.0, float(-k)] for k in range(600)]
+    assert _pooled(pool, values)["own"].tolist() == values
+
+
+def test_what_is_written_does_not_tell_of_a_pool() -> None:
+    values = [[1.0, 2.0, 3.0], [1.0, 2.0, float("nan")]]
+    plain = Columns(_OWN, {"A": 3})
+    for number, value in enumerate(values):
+        plain.write(plain.append(), {"own": np.array(value), "id": number})
+    pool = RowPool(2)
+    columns = _pooled(pool, values)
+    assert columns.to_dict() == plain.to_dict()
+    assert columns.row_bytes({}) == plain.row_bytes({})
+    columns.load(json.loads(json.dumps(plain.to_dict())))
+    assert columns.to_dict() == plain.to_dict()
+    assert len(pool) == 1
+    columns.keep(np.empty(0, dtype=np.intp))
+    assert len(pool) == 0

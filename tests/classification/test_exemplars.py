@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +14,19 @@ from toy_situations import BALL_VOCABULARY, Labelled, ball_stream
 
 from relgym.classification.examples import NOISE, Example
 from relgym.classification.exemplars import Exemplars, dyadic
+from relgym.classification.rows import RowPool
 from relgym.config import ClassificationConfig
 
 _CONFIG = ClassificationConfig(exemplars_per_state=5, noise_per_state=12, max_exemplars=100)
 
 
 def _filled(
-    items: list[Labelled], hard: range = range(0), config: ClassificationConfig = _CONFIG
+    items: list[Labelled],
+    hard: range = range(0),
+    config: ClassificationConfig = _CONFIG,
+    pool: RowPool | None = None,
 ) -> Exemplars:
-    exemplars = Exemplars(BALL_VOCABULARY, config)
+    exemplars = Exemplars(BALL_VOCABULARY, config, pool)
     exemplars.set_modes(range(6), np.empty(0, int), np.empty((0, 6), bool), np.empty((0, 6)))
     for number, item in enumerate(items):
         exemplars.add(item.example, item.mode, item.fits, item.values, hard=number in hard)
@@ -281,3 +286,16 @@ def test_the_kth_example_enters_with_probability_size_over_k() -> None:
     kept = np.bincount(exemplars.rows, minlength=40)
     assert kept.sum() == 3_200
     assert np.abs(kept / 400 - 0.2).max() < 4.0 * np.sqrt(0.2 * 0.8 / 400)
+
+
+def test_those_who_share_a_pool_keep_what_they_would_alone(items: list[Labelled]) -> None:
+    pool = RowPool(len(BALL_VOCABULARY.own))
+    alone = [_filled(part) for part in (items, items[::2])]
+    together = [_filled(part, pool=pool) for part in (items, items[::2])]
+    assert [each.to_dict() for each in together] == [each.to_dict() for each in alone]
+    assert [each.own_of(3).tolist() for each in together] == [
+        each.columns["own"][3].tolist() for each in alone
+    ]
+    assert len(pool) == len({row.tobytes() for each in alone for row in each.columns["own"]})
+    restored = pickle.loads(pickle.dumps(together))
+    assert [each.to_dict() for each in restored] == [each.to_dict() for each in alone]

@@ -13,6 +13,7 @@ from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.examples import Example, Vocabulary
 from relgym.classification.mode_classifier import ModeClassifier
 from relgym.classification.ranking import RankingBatch
+from relgym.classification.rows import RowPool
 from relgym.clustering.clusterer import ClusterReport, ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
@@ -76,6 +77,9 @@ class PropertyModel:
         Free parameters.
     schema
         The scenes' schema.
+    pool
+        Holds the numbers of the vocabulary's own features that its classifiers remember, and those of other targets of
+        its type.
 
     Attributes
     ----------
@@ -105,15 +109,22 @@ class PropertyModel:
     """
 
     def __init__(
-        self, target: Target, vocabulary: Vocabulary, config: ModelConfig, schema: SceneSchema
+        self,
+        target: Target,
+        vocabulary: Vocabulary,
+        config: ModelConfig,
+        schema: SceneSchema,
+        pool: RowPool,
     ) -> None:
         self.target = target
         self.schema = schema
         self.config = config
         self._base = vocabulary
+        self._pool = pool
         self.conditions = Conditions(schema, target)
         self.clusterer = ModeClusterer(target, config.clustering, seed=config.seed)
-        self.classifier = ModeClassifier(self.conditions.vocabulary(vocabulary, ()), config.classifying)
+        shown = self.conditions.vocabulary(vocabulary, ())
+        self.classifier = ModeClassifier(shown, config.classifying, pool)
         self.casting = Casting(vocabulary, config.classification)
         self.functions = ModeFunctions(self.clusterer, self.casting, config)
         self.fallback = Fallback(self.clusterer, offered=bool(features_for(config.features, target.type)))
@@ -328,7 +339,7 @@ class PropertyModel:
             c["unary"][slot][:, :k],
             c["close"][slot][:k],
             c["pair"][slot][:k],
-            c["own"][slot][: len(self._base.own)],
+            kept.own_of(slot)[: len(self._base.own)],
             int(c["target"][slot]),
             kept.key_of(slot),
             int(c["row"][slot]),
@@ -819,7 +830,7 @@ class PropertyModel:
         self.fallback.scope = Scope.from_json(data.get("scope", {}))
         self.latest = int(data.get("latest", NOISE))
         self._unsettled = bool(data.get("unsettled", False))
-        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying)
+        self.classifier = ModeClassifier.from_dict(data["classifier"], self.config.classifying, self._pool)
         self.conditions.keep(self.classifier.vocabulary.own)
         self.casting.restore(data["casting"])
         if self.candidates:
