@@ -20,7 +20,7 @@ MOST = {
     "hypotheses": (0, 3),
     "laws": (42, 42),
     "logic": (16, 11),
-    "model": (94, 42),
+    "model": (93, 42),
     "numeric": (16, 23),
     "scheduling": (1, 1),
 }

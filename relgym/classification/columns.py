@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.classification.rows import Gathered, RowPool
-from relgym.config.constants import FIRST_ROOM
+from relgym.config.constants import FIRST_ROOM, LARGE
 
 __all__ = ["Column", "Columns"]
 
@@ -140,6 +140,29 @@ class Columns:
         for name, column in self.columns.items():
             shape = (self.size, *(self.sizes[axis] for axis in column.axes))
             self[name] = _decode(data["arrays"][name], np.dtype(column.dtype), shape)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Without room to grow, and what is small in one piece: arrays take microseconds each to serialise.
+        used = [array[: self.size] for array in self._arrays.values()]
+        small = b"".join([array.tobytes() for array in used if array.nbytes < LARGE])
+        large = [array for array in used if array.nbytes >= LARGE]
+        held = {name: numbers[: self.size] for name, numbers in self._held.items()}
+        return self.__dict__ | {"_arrays": (small, large), "_held": held}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        small, large = state["_arrays"]
+        self._clear(max(FIRST_ROOM, self.size))
+        at, rest = 0, iter(large)
+        for array in self._arrays.values():
+            used = array[: self.size]
+            if used.nbytes < LARGE:
+                used[...] = np.frombuffer(small, used.dtype, used.size, at).reshape(used.shape)
+                at += used.nbytes
+            else:
+                used[...] = next(rest)
+        for name, numbers in state["_held"].items():
+            self._held[name][: self.size] = numbers
 
     def _clear(self, capacity: int) -> None:
         """Have room for so many rows, of which none is written."""

@@ -16,6 +16,7 @@ __all__ = [
     "EXTRAPOLATED",
     "FIRST_ROOM",
     "HOPELESS",
+    "LARGE",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
     "MORE_ROOM",
@@ -109,6 +110,9 @@ FIRST_ROOM: Final = 256
 
 CACHED: Final = 1 << 14
 """Numbers that are worked on at once where more would be, 128 kB: with what is made of them they fit a core's cache."""
+
+LARGE: Final = 1 << 14
+"""Bytes of an array from which on it is copied beside what is serialised, no longer with it."""
 
 MORE_ROOM: Final = 0.125
 """Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all."""

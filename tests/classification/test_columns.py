@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
+from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from relgym.classification.columns import Column, Columns
 from relgym.classification.rows import RowPool
@@ -118,3 +122,28 @@ def test_what_is_written_does_not_tell_of_a_pool() -> None:
     assert len(pool) == 1
     columns.keep(np.empty(0, dtype=np.intp))
     assert len(pool) == 0
+
+
+@pytest.mark.parametrize("rows", [0, 1, 300, 3000])  # of 3000 some arrays are large, others small
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda columns: pickle.loads(pickle.dumps(columns))])
+def test_copies_are_equal_and_go_on(rows: int, copied: Callable[[Columns], Columns]) -> None:
+    columns = _filled([1 + k % 2 for k in range(rows)])
+    again = copied(columns)
+    for number in range(300):
+        for each in (columns, again):
+            each.write(each.append(), {"flags": np.ones(3, bool), "numbers": np.ones((3, 2)), "id": -number})
+    assert again.to_dict() == columns.to_dict()
+    assert not any(np.shares_memory(again[name], columns[name]) for name in _SPEC)
+
+
+def test_a_pool_is_copied_with_all_who_share_it() -> None:
+    values = [[float(k % 7), 1.0, float(k)] for k in range(2000)]
+    pool = RowPool(2)
+    pair = _pooled(pool, values), _pooled(pool, values[::2])
+    first, second = pickle.loads(pickle.dumps(pair))
+    assert [first.to_dict(), second.to_dict()] == [each.to_dict() for each in pair]
+    first.keep(np.array([0]))
+    assert second["own"].tolist() == values[::2]
+    second.keep(np.array([0]))
+    assert first["own"].tolist() == values[:1]
+    assert [len(pool), len(first._pools["own"])] == [7, 1]

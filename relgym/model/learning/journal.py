@@ -9,6 +9,7 @@ steps alone: to take them again leads to the same model, bit for bit.
 from __future__ import annotations
 
 import copy
+import gc
 import io
 import pickle
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import MORE_ROOM
+from relgym.config.constants import LARGE, MORE_ROOM
 
 __all__ = ["Journal"]
 
@@ -30,9 +31,6 @@ STEPS = 1_000
 NUMBERS = 4_000_000
 """... or after steps of so many numbers together, 32 MB: of large scenes fewer are kept."""
 
-LARGE = 1 << 14
-"""Arrays of so many bytes and more are copied beside what is serialised."""
-
 
 class Journal:
     """The last checkpoint of an object, and the steps that it made since.
@@ -44,10 +42,14 @@ class Journal:
     takes up the room of the last one: memory that is new to a process takes several times as long to write to, and what
     is freed and asked for in ever other sizes leaves gaps that nobody fills. What can't be serialised, such as a user's
     function that has no name of its own, is copied, in some five times the time.
+
+    Steps that a checkpoint makes needless go two with each one that is added: never more are held than before it, and
+    to free a thousand of them at once takes as long as to serialise the object.
     """
 
     def __init__(self) -> None:
         self._taken: tuple[Callable[[], Any], list[Entry]] | None = None
+        self._needless: list[Entry] = []
         self._numbers = 0
         self._text, self._room = io.BytesIO(), np.empty(0, dtype=np.uint8)
 
@@ -60,6 +62,8 @@ class Journal:
             Gives all that steps change; called where a checkpoint is due.
         """
         if self._taken is None or len(self._taken[1]) >= STEPS or self._numbers >= NUMBERS:
+            if self._taken is not None:
+                self._needless = self._taken[1]
             self._taken = None  # its copies are about to be overwritten
             self._taken = (self._copied(whole()), [])
             self._numbers = 0
@@ -68,6 +72,7 @@ class Journal:
     def add(self, name: str, arguments: tuple[Any, ...], numbers: int = 0) -> None:
         """Take note of a step that was made."""
         assert self._taken is not None, "prepared before"
+        del self._needless[-2:]
         self._taken[1].append((name, arguments))
         self._numbers += numbers
 
@@ -93,18 +98,23 @@ class Journal:
         large: list[NDArray[np.uint8]] = []
 
         def aside(buffer: pickle.PickleBuffer) -> bool:
-            content = np.frombuffer(buffer.raw(), dtype=np.uint8)
-            if content.nbytes < LARGE:
+            raw = buffer.raw()
+            if raw.nbytes < LARGE:
                 return True  # to be serialised with the rest
-            large.append(content)
+            large.append(np.frombuffer(raw, dtype=np.uint8))
             return False
 
         self._text.seek(0)
+        collects = gc.isenabled()
         try:
+            gc.disable()  # what is made here goes at once, and so many objects made would have it look through all
             pickle.Pickler(self._text, protocol=5, buffer_callback=aside).dump(whole)
         except (AttributeError, TypeError, pickle.PicklingError):
             copied = copy.deepcopy(whole)
             return lambda: copy.deepcopy(copied)
+        finally:
+            if collects:
+                gc.enable()
         self._text.truncate()
         ends = np.cumsum([content.nbytes for content in large], dtype=np.int64).tolist()
         places = [slice(end - content.nbytes, end) for content, end in zip(large, ends, strict=True)]

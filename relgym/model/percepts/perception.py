@@ -192,7 +192,7 @@ class Perception:
         self._own_columns: dict[tuple[int, int], NDArray[np.intp]] = {}
         self._unary: dict[int, NDArray[np.bool_]] = {}
         self._features: dict[int, NDArray[np.intp]] = {}
-        self._pair_counts: dict[str, int] = {}
+        self._vocabularies: dict[str, Vocabulary] = {}
         self._states: dict[tuple[int, int, bytes, bytes], list[bytes]] = {}
         self._sights: dict[int, Sight | None] = {}
 
@@ -206,7 +206,7 @@ class Perception:
             "_own_columns",
             "_unary",
             "_features",
-            "_pair_counts",
+            "_vocabularies",
             "_states",
             "_sights",
         )
@@ -222,7 +222,9 @@ class Perception:
         return Percept(self, layout, vectors)
 
     def vocabulary(self, target: ObjectType) -> Vocabulary:
-        """Names of what classifiers of a type's targets are shown."""
+        """Names of what classifiers of a type's targets are shown; cached, so that they all share them."""
+        if (known := self._vocabularies.get(target.name)) is not None:
+            return known
         bodiless = [t for t in self.schema.types if not t.has_body and t.name != target.name]
         own = [
             *_free(target),
@@ -232,13 +234,9 @@ class Perception:
         taken = {*binary, *self._unary_names, *own}
         pair = [*self._contact_names, *(f"other-{p}" if p in taken else p for p in self._pair_names)]
         contact = frozenset({*self._contact_names, "approaching", "approaching-fastest"})
-        return Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
-
-    def pair_count(self, target: ObjectType) -> int:
-        """Number of names that a type's vocabulary has for pairs; cached."""
-        if (known := self._pair_counts.get(target.name)) is None:
-            known = self._pair_counts[target.name] = len(self.vocabulary(target).pair)
-        return known
+        found = Vocabulary(binary, self._unary_names, tuple(pair), tuple(own), contact)
+        self._vocabularies[target.name] = found
+        return found
 
     def signature_of(self, types: tuple[ObjectType, ...]) -> SlotSignature:
         """The slot signature of these types."""
@@ -426,7 +424,7 @@ class Percept:
         """An object without a body stands alone: no relations, only numbers."""
         perception, n = self.perception, len(self)
         own = self._padded()[:, perception.own_columns(self.layout, target)]
-        names = perception.pair_count(self.layout.types[target])
+        names = len(perception.vocabulary(self.layout.types[target]).pair)
         binary, single = len(perception.extractor.names), len(perception._unary_names)
         return ExampleBatch(
             np.zeros((n, binary, 1, 1), dtype=bool),

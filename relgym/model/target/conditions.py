@@ -74,7 +74,7 @@ class Conditions:
         """The vocabulary with the values as further own features, and what it needs to know of the target."""
         known = tuple(pair for pair in follows if pair[0] in base.own)
         present = self._property if self._property in base.own else ""
-        return replace(base, own=(*base.own, *self.names), follows=known, present=present)
+        return replace(base, own=base.own + self.names, follows=known, present=present)
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values on regression rows ``(n, d)``, shape ``(n, len(columns))``; NaN where an object is missing."""

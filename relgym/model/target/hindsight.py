@@ -12,6 +12,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from enum import Enum
+from functools import lru_cache
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -100,6 +101,12 @@ class Retrospect(NamedTuple):
     counted: bool
 
 
+@lru_cache
+def _step(spoken: int, wrong: int) -> tuple[int, int]:
+    """A step of `Hindsight`: one object for all that are alike, which is serialised once."""
+    return spoken, wrong
+
+
 class Hindsight:
     """The latest predictions of one target: how many there were in each step, and how many of them were wrong.
 
@@ -127,7 +134,7 @@ class Hindsight:
     """
 
     def __init__(self, steps: Iterable[tuple[int, int]] = (), *, undecided: bool = False) -> None:
-        self._steps = deque(((int(n), int(k)) for n, k in steps), maxlen=WINDOW)
+        self._steps = deque((_step(int(n), int(k)) for n, k in steps), maxlen=WINDOW)
         self.spoken = sum(n for n, _ in self._steps)
         self.wrong = sum(k for _, k in self._steps)
         self.undecided = undecided
@@ -141,7 +148,7 @@ class Hindsight:
         if len(self._steps) == WINDOW:
             n, k = self._steps[0]
             self.spoken, self.wrong = self.spoken - n, self.wrong - k
-        self._steps.append((spoken, wrong))
+        self._steps.append(_step(spoken, wrong))
         self.spoken, self.wrong = self.spoken + spoken, self.wrong + wrong
         self._settle()
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import sys
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
@@ -181,3 +183,32 @@ def test_a_checkpoint_takes_up_the_room_of_the_last_one() -> None:
         assert found["name"] == whole["name"]
         whole["name"] = "z"
     assert len(kept._room) > len(room)
+
+
+def test_no_more_steps_are_held_than_before_a_checkpoint() -> None:
+    class Step:
+        """A step's argument."""
+
+    kept, alive = journal.Journal(), weakref.WeakSet[Step]()
+
+    for number in range(3 * journal.STEPS):
+        kept.prepare(dict)
+        alive.add(step := Step())
+        kept.add("step", (step,))
+        del step
+        assert len(alive) <= min(number + 1, journal.STEPS)
+    done: list[str] = []
+    kept.replayed(lambda whole, name, given: done.append(name))
+    assert len(done) == journal.STEPS
+
+
+def test_the_collector_is_as_it_was() -> None:
+    kept = journal.Journal()
+    for enabled in (False, True):
+        (gc.enable if enabled else gc.disable)()
+        try:
+            kept.forget()
+            kept.prepare(lambda: {"what": lambda: 0})  # has no name of its own: it is copied
+            assert gc.isenabled() == enabled
+        finally:
+            gc.enable()
