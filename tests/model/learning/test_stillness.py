@@ -40,7 +40,7 @@ def test_a_flag_that_was_always_down_is_no_flag_that_is_always_up() -> None:
     rare = [0.0] * (STILL + 1) + [1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     model = taught(steps(0, rare, len(rare) - 1))
     modes = {mode.formula(): mode.examples for mode in model.modes("self", "flag")}
-    assert modes["flag' = 0"] > RECALLED
+    assert modes["flag' = flag"] > RECALLED
     record = model.property_model("self", "flag").calibration
     assert record.trials > 100  # that nothing changes was right
     fresh = steps(1, [0.0] * 101, 100)
