@@ -165,6 +165,6 @@ def code_length(errors: NDArray[np.float64], resolution: float, parameters: int 
     >>> code_length(np.array([0.0, 3.0, 1e300]), 1.0)
     70.0
     """
-    sizes = np.minimum(np.abs(errors) / resolution, 2.0**63)
-    bits = np.where(np.isnan(errors), 64.0, np.minimum(1.0 + 2.0 * np.log2(1.0 + sizes), 64.0))
+    most, sizes = float(np.finfo(np.float64).bits), np.abs(errors) / resolution
+    bits = np.where(np.isnan(errors), most, np.minimum(1.0 + 2.0 * np.log2(1.0 + sizes), most))
     return float(bits.sum()) + 0.5 * parameters * math.log2(max(len(errors), 2))

@@ -8,7 +8,7 @@ count objects: ten more boxes beside the track make no new situation, a box on t
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import Bools, Example, ExampleBatch, Vocabulary
 from relgym.classification.plans import Key
 from relgym.classification.views import Context, View
+from relgym.config.constants import ANSWERS
 from relgym.logic.situations import situation
 from relgym.mixing import mixed
 
@@ -26,8 +27,6 @@ Used: TypeAlias = tuple[tuple[Context, tuple[int, ...], tuple[int, ...]], ...]
 """Per context: columns of the binary and of the unary relations that clauses use."""
 
 _Hashes: TypeAlias = NDArray[np.uint64]
-
-_MOST_ANSWERS: Final = 8192
 
 
 class Familiarity:
@@ -50,7 +49,7 @@ class Familiarity:
         """Whether an example's situation was seen; answers are kept by `key` (`Plan.key`)."""
         found = self._known.get(key)
         if found is None:
-            if len(self._known) >= _MOST_ANSWERS:
+            if len(self._known) >= ANSWERS:
                 self._known.clear()
             found = self._known[key] = self._situation(example) in self.seen
         return found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,14 @@ from relgym.classification.binary import BinaryClassifier, majority, tree_column
 from relgym.classification.examples import Bools, Floats
 from relgym.classification.views import CONTEXTS, Context, Scope, View
 from relgym.config import ClassificationConfig
+from relgym.config.constants import CALL, SHORT
 from relgym.logic.clause import Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.foil import FoilConfig, learn_both
 from relgym.numeric.tree import DecisionTree, learn_tree
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["SHORT", "Lesson", "foil_config", "learn_pair"]
-
-SHORT: Final = 3
-"""A faultless definition of so few literals isn't challenged by a wider context, nor by more examples that agree."""
+__all__ = ["Lesson", "foil_config", "learn_pair"]
 
 _Rows = NDArray[np.int64]
 
@@ -161,7 +158,9 @@ def _rate(lesson: Lesson, wrong: _Rows, here: _Rows, suffering: Bools) -> float:
     """
     w = lesson.weights
     errors = float(w[wrong].sum())
-    return max(errors / max(float(w[part].sum()), 1e-300) for part in (here, suffering))
+    return max(
+        errors / max(float(w[part].sum()), float(np.finfo(np.float64).tiny)) for part in (here, suffering)
+    )
 
 
 def _tree(

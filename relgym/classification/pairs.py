@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
@@ -12,11 +13,12 @@ from numpy.typing import NDArray
 
 from relgym.classification.binary import BinaryClassifier, majority
 from relgym.classification.examples import NOISE
-from relgym.classification.learning import SHORT, Lesson, learn_pair
+from relgym.classification.learning import Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.logic.search import GROUP, UNIT
+from relgym.config.constants import CALL, SHORT
+from relgym.logic.search import UNIT
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
@@ -105,7 +107,7 @@ class PairState:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
             mendable = not grown and all(lesson.counts)
             mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
-            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + GROUP // UNIT
+            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + CALL // UNIT
             if mended is not None:
                 self._adopt(mended, lesson, mended=True)
                 return work + mended.work
@@ -113,7 +115,7 @@ class PairState:
             self._taught = lesson.counts
             if mendable:
                 return work
-        work = self.draft.advance(int(min(budget * UNIT, 2**62))) // UNIT + 1
+        work = self.draft.advance(int(min(budget * UNIT, sys.maxsize))) // UNIT + 1
         if self.draft.done:
             found = self.draft.result
             self.learned = self._taught

@@ -25,6 +25,7 @@ from relgym.classification.examples import (
     turned,
 )
 from relgym.classification.views import Context
+from relgym.config.constants import ANSWERS, MOST_BYTES
 from relgym.logic.clause import ANY, Clause, Literal
 from relgym.logic.csp import World, solutions
 from relgym.numeric.tree import DecisionTree
@@ -35,8 +36,6 @@ Key: TypeAlias = tuple[int, bytes, bytes, bytes, bytes]
 """Target, approached and close objects, binary and unary relations of an example."""
 
 _SOME: Final = "some object"  # stands for a numeric test of a variable while objects are looked for
-_MOST_MEMORY: Final = 32 * 2**20  # of plans that are remembered, in bytes
-_PLAN: Final = 8192  # of a plan besides its tables, in bytes
 _NAN: Final = float("nan")
 
 _Binding: TypeAlias = tuple[int, ...]
@@ -181,10 +180,11 @@ class Planner:
         plan = self._plans.get(key)
         if plan is None:
             # A plan has tables twice: in its key, and as what clauses are asked of.
-            self._memory += _PLAN + 2 * (table.nbytes + unary.nbytes)
-            if self._memory > _MOST_MEMORY:
+            memory = 2 * (table.nbytes + unary.nbytes)
+            self._memory += memory
+            if len(self._plans) >= ANSWERS or self._memory > MOST_BYTES:
                 self._plans.clear()
-                self._memory = _PLAN + 2 * (table.nbytes + unary.nbytes)
+                self._memory = memory
             plan = self._plans[key] = self._new_plan(key, table, unary, (struck, close))
         if plan.version != self._version:
             self._update(plan)

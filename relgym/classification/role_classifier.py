@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
+from relgym.config.constants import ANSWERS
 from relgym.logic.clause import Definition
 from relgym.logic.csp import World, matches
 from relgym.logic.facts import Facts
@@ -25,7 +27,6 @@ from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["RoleClassifier", "RoleKind"]
 
-_MOST_ANSWERS: Final = 4096
 _Rows: TypeAlias = NDArray[np.int64]
 
 
@@ -153,7 +154,7 @@ class RoleClassifier:
         rank = None if order is None else tuple(order)
         key = (example.target, example.table.tobytes(), example.unary.tobytes(), rank)
         if key not in self._answers:
-            if len(self._answers) >= _MOST_ANSWERS:
+            if len(self._answers) >= ANSWERS:
                 self._answers.clear()
             self._answers[key] = self._search(example, rank or tuple(range(example.table.shape[-1])))
         found, single = self._answers[key]
@@ -216,7 +217,7 @@ class RoleClassifier:
         if self._draft is None:
             self._begin(view, roles, weights)
             assert self._draft is not None, "begun"
-        work = self._draft.advance(int(min(budget * UNIT, 2**62))) // UNIT + 1
+        work = self._draft.advance(int(min(budget * UNIT, sys.maxsize))) // UNIT + 1
         if self._draft.done:
             self._adopt(self._draft.result, view, roles, weights)
         return work
@@ -332,7 +333,7 @@ class RoleClassifier:
         """Objects of its type for which each description holds; kept per relational state."""
         key = (example.target, example.table.tobytes(), example.unary.tobytes())
         if key not in self._extensions:
-            if len(self._extensions) >= _MOST_ANSWERS:
+            if len(self._extensions) >= ANSWERS:
                 self._extensions.clear()
             world = self._world(example)
             self._extensions[key] = [

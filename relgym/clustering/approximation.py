@@ -14,6 +14,7 @@ columns are searched alone, too. What was found first gives way to a shorter fun
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Final
 
 import numpy as np
@@ -21,17 +22,18 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
+from relgym.config.constants import CALL, TYPICAL
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "EQUAL",
     "LEFT",
     "LEFT_LINEAR",
     "NEARLY_ALL",
-    "NORMAL",
     "Approximation",
     "approximate",
+    "normal_reach",
     "reach",
     "terms_of",
 ]
@@ -45,9 +47,6 @@ NOISY, ALIKE = 0.5, 0.2
 
 NEARLY_ALL = 0.9
 """Least share of the examples that it must be good for."""
-
-NORMAL = 1.6449
-"""So many standard deviations hold that share of a normal distribution."""
 
 MANY_FEATURES = (200, 800)
 """Among so many columns an approximation may have twice, or three times, as many terms as a mode."""
@@ -84,9 +83,14 @@ def terms_of(columns: int, config: ClusteringConfig) -> int:
     return config.max_terms * (1 + sum(columns > many for many in MANY_FEATURES))
 
 
+def normal_reach() -> float:
+    """So many standard deviations hold `NEARLY_ALL` of a normal distribution."""
+    return NormalDist().inv_cdf(0.5 + 0.5 * NEARLY_ALL)
+
+
 def reach(errors: NDArray[np.float64], floor: float = 0.0) -> float:
     """The error, in units of y, that nearly all rows stay below; errors as small as rounding are all alike."""
-    return max(float(np.quantile(errors, NEARLY_ALL)), NORMAL * floor)
+    return max(float(np.quantile(errors, NEARLY_ALL)), normal_reach() * floor)
 
 
 @resumable
@@ -209,10 +213,10 @@ class _Search:
     def _explained(self, fit: LinearFit) -> NDArray[np.bool_]:
         """Rows that a function is good for, shape ``(n,)``."""
         errors = self._errors(fit)
-        spread = 1.4826 * float(np.median(errors))  # of a normal distribution, whatever the outliers
+        spread = float(np.median(errors)) / TYPICAL  # of a normal distribution, whatever the outliers
         explained: NDArray[np.bool_] = errors <= self.stds * max(spread, self.floor)
         if self.noisy and explained.mean() < NEARLY_ALL:
-            explained = errors <= self.stds * reach(errors) / NORMAL
+            explained = errors <= self.stds * reach(errors) / normal_reach()
         return explained
 
     def _lawless(self, fit: LinearFit, explained: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
-from relgym.config.constants import PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED
+from relgym.config.constants import CALL, PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
     LinearFit,
@@ -34,7 +34,7 @@ from relgym.numeric.stepwise import (
     least_squares,
     varying_columns,
 )
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "EXACT",

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.config.constants import SAMPLES_ALIKE, SAMPLES_TRIED, SCENE_ROWS
+from relgym.config.constants import CALL, SAMPLES_ALIKE, SAMPLES_TRIED, SCENE_ROWS
 from relgym.numeric.ransac import choose_columns
 from relgym.numeric.stepwise import LinearFit, least_squares, varying_columns
-from relgym.scheduling.work import CALL, Steps
+from relgym.scheduling.work import Steps
 
 __all__ = ["Reading", "orders_of", "readings"]
 

@@ -15,6 +15,7 @@ of the legs.
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +88,7 @@ def last_resort(
         Whether the present modes are approximations too.
     """
     resort = Resort.of(population, table, floor=floor, again=again)
-    resort.task.advance(2**62)
+    resort.task.advance(sys.maxsize)
     return resort.found(population, table, floor=floor, again=again)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from relgym.config.constants import DIGITS
 from relgym.scene.objects import Target
 
 __all__ = ["NOISE", "Mode", "Role", "sum_text"]
@@ -84,7 +85,7 @@ class Mode:
         pairs = zip(*numbers, strict=True)
         return all(abs(a - b) <= tolerance * max(1.0, abs(a), abs(b)) for a, b in pairs)
 
-    def formula(self, digits: int = 7) -> str:
+    def formula(self, digits: int = DIGITS) -> str:
         """The function as text: ``vx' = 0.525 vx - 0.8227241 vy + 0.0004243524``.
 
         The target's own properties stand alone; those of another role are prefixed by its letter

@@ -25,11 +25,11 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
-from relgym.config.constants import HOPELESS, SEARCHED_CELLS
+from relgym.config.constants import CALL, HOPELESS, SEARCHED_CELLS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.agenda import Budget
-from relgym.scheduling.work import CALL, Task
+from relgym.scheduling.work import Task
 
 __all__ = ["ModeSearch", "Search"]
 

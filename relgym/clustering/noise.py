@@ -44,9 +44,6 @@ MANY = 8
 SINGLES = 2.0
 """The same for numbers that were rounded to single precision when they were observed."""
 
-TINY = 1e-38
-"""Numbers may all be zero or subnormal; noise is never so small that its square vanishes."""
-
 
 def rounding_noise(
     x: NDArray[np.float64], y: NDArray[np.float64], recent: NDArray[np.float64] | None = None
@@ -69,7 +66,7 @@ def rounding_noise(
     """
     largest = float(np.abs(y).max(initial=0.0))
     if bool(_single(y).all()) and bool(np.any(y != np.round(y))):
-        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, TINY)
+        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, float(np.finfo(np.float32).tiny))
     if recent is not None and _rounded(recent):
         return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
     scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)

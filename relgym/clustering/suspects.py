@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
+from relgym.config.constants import TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
@@ -27,9 +28,6 @@ FIRST = 512
 BADLY = 2.0
 """Examples of a state are suspects if their errors' mean square is so many times the noise's variance, or what
 is usual where noise was underrated."""
-
-MEDIAN = 0.4549
-"""Median of a standard normal variable's square."""
 
 CONVINCING = 12.0
 """Evidence, in bits, that a function needs beyond what it takes to state it."""
@@ -71,7 +69,7 @@ def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Sc
     """
     square = np.square(np.minimum(errors / scale.sigma, CAPPED))
     _, state, count = np.unique(strata, return_inverse=True, return_counts=True)
-    usual = max(1.0, float(np.median(square)) / MEDIAN) if len(square) else 1.0
+    usual = max(1.0, float(np.median(square)) / TYPICAL**2) if len(square) else 1.0
     badly = np.bincount(state, weights=square) >= BADLY * usual * count
     found: NDArray[np.intp] = np.flatnonzero(badly[state])[-MOST:]
     return found

@@ -5,11 +5,15 @@ They aren't settings: nothing in an env asks for others. What a user may want to
 
 from __future__ import annotations
 
+import sys
 from typing import Final
 
 __all__ = [
+    "ALL_DIGITS",
+    "ANSWERS",
     "BEYOND",
     "CACHED",
+    "CALL",
     "CONTACTS_KEPT",
     "DIGITS",
     "EVIDENCE",
@@ -20,6 +24,7 @@ __all__ = [
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
     "MORE_ROOM",
+    "MOST_BYTES",
     "MOST_STEPS",
     "PIVOT",
     "POWERS",
@@ -29,11 +34,13 @@ __all__ = [
     "SAMPLES_TRIED",
     "SCENE_ROWS",
     "SEARCHED_CELLS",
+    "SHORT",
     "STDS",
     "SUMMABLE",
     "TALLY_DIGITS",
     "TIE_BITS",
     "TOLD",
+    "TYPICAL",
 ]
 
 EVIDENCE: Final = 10.0
@@ -104,6 +111,24 @@ LEAST_EXEMPLARS: Final = 100
 
 DIGITS: Final = 7
 """Significant digits of numbers in formulas, unless somebody asks for others."""
+
+ALL_DIGITS: Final = sys.float_info.dig + 2
+"""Significant digits that tell every float64 from every other one."""
+
+TYPICAL: Final = 0.6744897501960817
+"""Median of a normal variable's size, in standard deviations: ``NormalDist().inv_cdf(0.75)``."""
+
+SHORT: Final = 3
+"""Literals of a definition so short that a faultless one is taken as it is: hardly one in a table of clauses is."""
+
+ANSWERS: Final = 4_096
+"""Answers that are remembered, until all are forgotten: some 10 MB of those of small scenes."""
+
+MOST_BYTES: Final = 32 << 20
+"""Memory of what is remembered only to be quicker, and of one array that is worked on: a few of them fit anywhere."""
+
+CALL: Final = 25_000
+"""What a few array operations cost however few numbers they look at, in cells: a tenth of a millisecond."""
 
 FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first, and for at least so many more whenever it is full."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import LEFT_OPEN
+from relgym.config.constants import LEFT_OPEN, TYPICAL
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
@@ -258,7 +258,7 @@ class FreeLearner:
             columns = x[:, list(self.sources.preference(k))]
             start = float(np.abs(y[:, k]).max(initial=0.0)) * 1e-12 + 1e-300
             fit = forward_stepwise(columns, y[:, k], sigma=start, max_terms=MOST_TERMS, eliminate=False)
-            left.append(1.4826 * float(np.median(np.abs(y[:, k] - fit.predict(columns)))))
+            left.append(float(np.median(np.abs(y[:, k] - fit.predict(columns)))) / TYPICAL)
         return max(left, default=0.0)
 
     def to_json(self) -> list[Any]:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
 
 import numpy as np
 
 from relgym.arguments import refusing
+from relgym.config.constants import MOST_BYTES
 from relgym.errors import ConfigError
 from relgym.logic.clause import ANY, Clause, Definition, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
 
 __all__ = ["decide", "extremes", "matches"]
-
-_CELLS: Final = 1 << 22
-"""Upper bound of a tensor's size; larger batches are cut into pieces."""
 
 
 @refusing(ConfigError)
@@ -129,7 +126,7 @@ def _components(literals: Sequence[Literal], arity: int) -> list[tuple[list[int]
 
 
 def _pieces(facts: Facts, size: int, width: int) -> Iterator[slice]:
-    step = max(1, _CELLS // max(facts.objects, 1) ** width)
+    step = max(1, MOST_BYTES // max(facts.objects, 1) ** width)
     return (slice(start, start + step) for start in range(0, size, step))
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import MOST_BYTES
 from relgym.logic.clause import ANY, Literal
 from relgym.logic.cuts import Cuts, best_cuts
 from relgym.logic.facts import Float, Int
@@ -23,9 +23,6 @@ from relgym.logic.templates import Template
 from relgym.logic.thresholds import simplest_between
 
 __all__ = ["Block", "blocks"]
-
-_CELLS: Final = 1 << 24
-"""No new variable may make a clause's bindings larger than this."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +78,7 @@ def blocks(
         Tells how many existential variables the clause may have, and whether thresholds are among the literals.
     """
     room = config.max_new_variables - growing.existentials
-    if growing.bindings.size * tables.facts.objects > _CELLS:
+    if growing.bindings.size * tables.facts.objects > MOST_BYTES:
         room = 0
     for width in tables.widths:
         for variables in itertools.permutations(range(growing.existentials), width):

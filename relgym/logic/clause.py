@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from string import ascii_uppercase
 from typing import Any, Final
 
 from relgym.arguments import refusing_calls
@@ -29,7 +30,7 @@ _OPERATORS = (None, "<=", ">")
 def _variable_name(variable: int) -> str:
     if variable == ANY:
         return "*"
-    return chr(ord("A") + variable) if variable < 26 else f"V{variable}"
+    return ascii_uppercase[variable] if variable < len(ascii_uppercase) else f"V{variable}"
 
 
 def _require(plain: Mapping[str, Any], *names: str) -> None:

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from relgym.config.constants import TALLY_DIGITS
+from relgym.config.constants import CALL, SHORT, TALLY_DIGITS
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
 from relgym.logic.growing import EPS, Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
-from relgym.logic.search import GROUP, Harvest, grow
+from relgym.logic.search import Harvest, grow
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps
@@ -27,9 +27,6 @@ _ATTEMPTS: Final = 8
 
 _RELAID: Final = 0.7
 """Share of the tuples below which a search gets tables of its own."""
-
-_SHORT: Final = 3
-"""A definition without errors and of no more literals isn't tried to be told more briefly."""
 
 
 class Cover:
@@ -72,7 +69,7 @@ class Cover:
             return self._definition((yield from self._clauses(self._config, math.inf, pure=True)))
         # relations alone first: thresholds that tell most tuples apart would crowd them out of the beam
         best = self._definition((yield from self._clauses(replace(self._config, numeric=False), limit)))
-        looks = [(False, 1), (True, _SHORT)] if self._tables.functions else [(True, _SHORT)]
+        looks = [(False, 1), (True, SHORT)] if self._tables.functions else [(True, SHORT)]
         for pure, enough in looks:
             if best.errors <= EPS and sum(map(len, best.clauses)) <= enough:
                 break
@@ -101,7 +98,7 @@ class Cover:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))
-            yield GROUP
+            yield CALL
             if self._accepts(clause, covered, problem.count(alive)):
                 return clause
         return None

@@ -101,8 +101,9 @@ class World:
 
 
 def _powers(size: int) -> NDArray[Any]:
-    # beyond 62 objects a mask outgrows int64, and Python's integers take over
-    return np.array([1 << slot for slot in range(size)], dtype=np.int64 if size < 63 else object)
+    # of so many objects a mask outgrows int64, and Python's integers take over
+    large = size >= np.iinfo(np.int64).bits - 1
+    return np.array([1 << slot for slot in range(size)], dtype=object if large else np.int64)
 
 
 @refusing(ConfigError)

@@ -14,8 +14,6 @@ from relgym.logic.clause import Clause, Coverage, Literal
 
 __all__ = ["DescriptionLength"]
 
-_LOG2 = math.log(2.0)
-
 
 class DescriptionLength:
     """Bits of clauses and exceptions, for one vocabulary.
@@ -55,7 +53,7 @@ class DescriptionLength:
             bits += 1.0 + self._name + arguments * math.log2(variables + 1.0)
             bits += self.number(literal)
             variables = max(variables, max(literal.variables, default=-1) + 1)
-        return bits - math.lgamma(len(literals) + 1.0) / _LOG2
+        return bits - math.lgamma(len(literals) + 1.0) / math.log(2.0)
 
     def number(self, literal: Literal) -> float:
         """Return the bits of a literal's threshold, 0 if it has none."""
@@ -66,14 +64,14 @@ class DescriptionLength:
     def clauses(self, clauses: Iterable[Clause]) -> float:
         """Return the bits of several clauses, whose order is free too."""
         costs = [self.clause(clause) for clause in clauses]
-        return max(sum(costs) - math.lgamma(len(costs) + 1.0) / _LOG2, 0.0)
+        return max(sum(costs) - math.lgamma(len(costs) + 1.0) / math.log(2.0), 0.0)
 
     @staticmethod
     def exceptions(total: float, wrong: float) -> float:
         """Return the bits to say which `wrong` of `total` tuples are exceptions; weights may be fractions."""
         total, wrong = max(total, 0.0), min(max(wrong, 0.0), total)
         subsets = math.lgamma(total + 1.0) - math.lgamma(wrong + 1.0) - math.lgamma(total - wrong + 1.0)
-        return math.log2(total + 1.0) + max(subsets, 0.0) / _LOG2
+        return math.log2(total + 1.0) + max(subsets, 0.0) / math.log(2.0)
 
     def saving(self, bits: float, covered: Coverage, whole: Coverage) -> float:
         """Return what a clause of so many bits saves: what is listed without it, less it and what is left."""

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import TALLY_DIGITS
+from relgym.config.constants import CALL, TALLY_DIGITS
 from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
@@ -20,17 +20,13 @@ from relgym.logic.tables import Tables
 from relgym.logic.thresholds import signs_differ
 from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["GROUP", "UNIT", "Harvest", "grow"]
+__all__ = ["UNIT", "Harvest", "grow"]
 
 
 _PATIENCE: Final = 2
 """A search ends after so many literals that told neither tuples nor bindings apart better; one that connects pays only
 with the next."""
 
-
-GROUP: Final = 32_000
-"""What a group of literals tried on a clause costs however few its tuples, in cells: it takes a tenth of a millisecond.
-Beside it two literals tried on a tuple cost one: a literal takes half a nanosecond."""
 
 UNIT: Final = 12
 """Cells that one unit of `ModelConfig.work_per_step` stands for."""
@@ -82,7 +78,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
-        yield GROUP * found.groups + tables.size * found.size // 2
+        yield CALL * found.groups + tables.size * found.size // 2
         lookahead = config.lookahead if depth < config.max_literals else 0
         new = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
         beam = _promising(new, pool.values())

@@ -19,7 +19,6 @@ _Hashes: TypeAlias = NDArray[np.uint64]
 _Bools: TypeAlias = NDArray[np.bool_]
 
 _GOLDEN: Final = np.uint64(GOLDEN)
-_NOTHING: Final = np.uint64(0)
 
 
 def situation(table: _Bools, unary: _Bools, target: NDArray[np.int64], exists: _Bools) -> _Hashes:
@@ -47,8 +46,8 @@ def situation(table: _Bools, unary: _Bools, target: NDArray[np.int64], exists: _
     described = _hash_bits(np.concatenate([own, towards, back, self_[:, :, None]], axis=-1))
     among = _hash_bits(table)  # (n, K, K): how each object stands to each other one
     pairs = mixed(among + described[:, None, :])
-    neighbours = _set_hash(np.where(exists[:, None, :], pairs, _NOTHING))
-    return _set_hash(np.where(exists, mixed(described + neighbours), _NOTHING))
+    neighbours = _set_hash(np.where(exists[:, None, :], pairs, np.uint64(0)))
+    return _set_hash(np.where(exists, mixed(described + neighbours), np.uint64(0)))
 
 
 def _hash_bits(bits: _Bools) -> _Hashes:
@@ -60,6 +59,6 @@ def _hash_bits(bits: _Bools) -> _Hashes:
 def _set_hash(members: _Hashes) -> _Hashes:
     """Hash of the set of non-zero numbers along the last axis."""
     ordered = np.sort(members, axis=-1)
-    ordered[..., 1:][ordered[..., 1:] == ordered[..., :-1]] = _NOTHING
+    ordered[..., 1:][ordered[..., 1:] == ordered[..., :-1]] = 0
     total: _Hashes = ordered.sum(axis=-1, dtype=np.uint64)
     return total

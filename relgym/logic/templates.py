@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Final
 
 from relgym.logic.clause import ANY, Literal
@@ -82,7 +82,7 @@ def templates(facts: Facts, names: Sequence[str], arity: int, max_new: int) -> I
                 yield Template(name, (0, *slots) if relative else slots)
 
 
-@lru_cache(maxsize=256)
+@cache
 def _patterns(stored: int, first: int, arity: int, max_new: int) -> tuple[tuple[int, ...], ...]:
     """All ways to fill `stored` arguments without repeating one of the target variables from `first` on."""
     found = []

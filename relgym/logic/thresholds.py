@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ALL_DIGITS
 from relgym.logic.facts import Float, Int
 
 __all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_between"]
@@ -140,7 +141,7 @@ def simplest_between(low: float, high: float) -> float:
     if signs_differ(low, high):
         return 0.0
     middle, margin = low + (high - low) / 2, _CLEAR * (high - low)
-    for digits in range(1, 18):
+    for digits in range(1, ALL_DIGITS + 1):
         number = float(f"{middle:.{digits}g}")
         if low + margin <= number <= high - margin and low <= number < high:
             return number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -16,7 +17,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.percepts.perception import Percept, Perception
-from relgym.model.percepts.scenes import MOST_LAYOUTS, TURN, mismatch, next_values, passage
+from relgym.model.percepts.scenes import MOST_LAYOUTS, mismatch, next_values, passage
 from relgym.model.percepts.screening import Screen
 from relgym.model.predicting.chaining import Inquiry, Look, in_order
 from relgym.model.predicting.motion import Laws, possible_targets
@@ -315,7 +316,7 @@ class Parts:
         for target in self.targets:
             for index in layout.of_type(target.type):
                 column = layout.column(index, target.property)
-                turn = TURN if target.property in layout.types[index].angles else 0.0
+                turn = math.tau if target.property in layout.types[index].angles else 0.0
                 key = layout.names[index], target.property
                 found[key] = Answer(target, self.models[target], index, column, turn)
         if len(self._answers) >= MOST_LAYOUTS:

@@ -18,7 +18,7 @@ from relgym.arguments import array_of, refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.config.checks import checked_count
-from relgym.config.constants import MOST_STEPS
+from relgym.config.constants import ALL_DIGITS, DIGITS, MOST_STEPS, SUMMABLE
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
@@ -73,7 +73,7 @@ __all__ = ["LearnReport", "WorldModel", "with_action"]
 
 _TAKES_ARRAYS = "device='cuda': this model, or one of the scenes, takes arrays: device='cpu' has them"
 
-_OVERFLOWS = 1e30
+_OVERFLOWS = math.sqrt(math.sqrt(SUMMABLE))
 """Products of several numbers as large as this may be infinite."""
 
 
@@ -771,7 +771,7 @@ class WorldModel:
         self,
         *,
         details: bool = False,
-        digits: int = 7,
+        digits: int = DIGITS,
         names: Mapping[str, str] | None = None,
         check: Iterable[Scene] | None = None,
         frame: str | None = None,
@@ -804,7 +804,7 @@ class WorldModel:
         """
         from relgym.model.reports.report import describe
 
-        digits = whole("digits", digits, 1, 18, ConfigError)
+        digits = whole("digits", digits, 1, ALL_DIGITS + 1, ConfigError)
         return describe(
             self, details=details, digits=digits, names=names, check=check, frame=frame, incline=incline
         )
@@ -889,10 +889,10 @@ class WorldModel:
                 yield signature.types
 
     @refusing(QueryError)
-    def law_lines(self, scene: Scene, index: int, digits: int = 7) -> tuple[str, ...]:
+    def law_lines(self, scene: Scene, index: int, digits: int = DIGITS) -> tuple[str, ...]:
         """What laws of motion say of an object: its free law, then every contact, a line each."""
         index = whole("index", index, 0, len(scene), QueryError)
-        digits = whole("digits", digits, 1, 18, ConfigError)
+        digits = whole("digits", digits, 1, ALL_DIGITS + 1, ConfigError)
         laws = self._parts.laws
         if large(scene.layout):
             small = self._near(scene).named(index)
@@ -993,7 +993,10 @@ class WorldModel:
         """What can't be told without the history: rules, as text, and advice."""
         if self.frozen and self._stored is None:
             return {}
-        return {"rules": self.rules().text(17), "advice": [asdict(advice) for advice in self.advice()]}
+        return {
+            "rules": self.rules().text(ALL_DIGITS),
+            "advice": [asdict(advice) for advice in self.advice()],
+        }
 
     def _restore_report(self, data: Mapping[str, Any]) -> None:
         if data:

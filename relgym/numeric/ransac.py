@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EXTRAPOLATED, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
+from relgym.config.constants import CACHED, CALL, EXTRAPOLATED, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
 from relgym.numeric.stepwise import (
     COARSE,
     MANY,
@@ -30,19 +30,13 @@ from relgym.numeric.stepwise import (
     least_squares,
     varying_columns,
 )
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "extrapolated", "refine"]
 
 CLOSE = 0.01
 """Samples are extrapolated with a wider tolerance (`EXTRAPOLATED`), but not so wide, where there is noise, that it
 tells nothing: no wider than this share of the responses' spread, unless a few standard deviations are."""
-
-DRAWN = 250_000
-"""So many random numbers are drawn in a piece of work: some ten milliseconds."""
-
-CHUNK = 30_000
-"""So many numbers of samples are worked on at a time: they fit into the processor's cache."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,24 +74,24 @@ def draw_samples(
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     style = np.arange(draws) % 3
     found = np.empty((draws, min(size, n)), dtype=np.intp)
-    for piece in _pieces(draws, DRAWN, n):
-        for part in _pieces(len(first[piece]), CHUNK, n):
-            base, how = first[piece][part], style[piece][part]
-            keys = rng.random((len(base), n))
-            if strata is not None:
-                alike = np.flatnonzero(how == 1)
-                own = base[alike]
-                other = strata[None, :] != strata[own][:, None]
-                further = 2.0 * other
-                if apart is not None:
-                    few = n - other.sum(axis=1) < size
-                    further[few] = np.where(other[few], 1.0 + apart[own[few]], 0.0)
-                keys[alike] += further
-            near = np.flatnonzero(how == 2)
-            keys[near] += np.abs(np.arange(n)[None, :] - base[near][:, None]) // (2 * size)
-            keys[np.arange(len(base)), base] = -1.0
-            found[piece][part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
-        yield CALL + 2 * len(first[piece]) * n
+    for part in _pieces(draws, CACHED, n):
+        base, how = first[part], style[part]
+        keys = rng.random((len(base), n))
+        if strata is not None:
+            alike = np.flatnonzero(how == 1)
+            own = base[alike]
+            other = strata[None, :] != strata[own][:, None]
+            further = 2.0 * other
+            if apart is not None:
+                few = n - other.sum(axis=1) < size
+                further[few] = np.where(other[few], 1.0 + apart[own[few]], 0.0)
+            keys[alike] += further
+        near = np.flatnonzero(how == 2)
+        keys[near] += np.abs(np.arange(n)[None, :] - base[near][:, None]) // (2 * size)
+        keys[np.arange(len(base)), base] = -1.0
+        found[part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
+        yield 2 * len(base) * n
+    yield CALL
     return found
 
 
@@ -210,7 +204,7 @@ def _forward_batch(
     enough = size * (loose * sigma) ** 2
     choose = _choose_among_many if x.shape[1] > MANY else choose_columns
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
-    for part in _pieces(draws, CHUNK, size * x.shape[1]):
+    for part in _pieces(draws, CACHED, size * x.shape[1]):
         a, b = x[samples[part].T], y[samples[part]]
         a -= a.mean(axis=0)
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)

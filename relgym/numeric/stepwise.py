@@ -19,8 +19,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import PIVOT
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.config.constants import CALL, PIVOT
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "LinearFit",

@@ -16,16 +16,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CACHED
+from relgym.config.constants import CACHED, CALL
 from relgym.errors import ConfigError
-from relgym.scheduling.work import CALL, Steps, resumable
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["DecisionTree", "learn_tree"]
 
 _Float1D: TypeAlias = NDArray[np.float64]
 _Float2D: TypeAlias = NDArray[np.float64]
 
-_LEAF = -1
 _ROUNDING = 1e-10  # values that differ by less, relative to the greatest, are equal
 _TIE = 1e-9  # entropies (bits per example) closer than this are equal: the wider gap decides
 
@@ -95,7 +94,7 @@ class DecisionTree:
     @property
     def leaves(self) -> tuple[int, ...]:
         """Node numbers of the leaves, from low to high."""
-        return tuple(node for node, column in enumerate(self.column) if column == _LEAF)
+        return tuple(node for node, column in enumerate(self.column) if column < 0)
 
     def path(self, leaf: int) -> str:
         """The tests that lead to a leaf, of each feature the closest: ``vx <= 0.5 ∧ vy > 1``; ``always`` if none."""
@@ -209,7 +208,7 @@ CUT = 30
 class _Node:
     positive: float
     negative: float
-    column: int = _LEAF
+    column: int = -1  # none: a leaf
     threshold: float = 0.0
     cuts: int = 0  # how many cuts there were to choose from
     children: tuple[_Node, _Node] | None = None
@@ -295,7 +294,7 @@ class _Grower:
 
 def _entropy(positive: _Float1D, negative: _Float1D) -> _Float1D:
     """Total entropy in bits of groups with these weights: sum of ``-w log2(share)``."""
-    total = np.maximum(positive + negative, 1e-300)
+    total = np.maximum(positive + negative, float(np.finfo(np.float64).tiny))
     parts = [np.maximum(part, 0.0) for part in (positive, negative)]
     bits = [-part * np.log2(np.where(part > 0, part / total, 1.0)) for part in parts]
     total_bits: _Float1D = bits[0] + bits[1]

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = ["VersionSpace"]
-
-_HALF: Final = 0.5
-"""Prior odds of a bound, and of a rule with one column more."""
 
 
 class VersionSpace:
@@ -74,7 +70,7 @@ class VersionSpace:
         if not sets:
             return
         sizes = np.array([len(each) for each in sets])
-        weights = _HALF**sizes / np.bincount(sizes)[sizes]  # sets of many columns are many
+        weights = np.exp2(-sizes) / np.bincount(sizes)[sizes]  # sets of many columns are many
         drawn = rng.choice(len(sets), size=count, p=weights / weights.sum())
         width = max(sizes[drawn])
         # A column that is asked twice doesn't matter: short rules are filled up with their first one.
@@ -125,8 +121,8 @@ class VersionSpace:
         least, most = self._least[columns], self._most[columns]
         low = least - rng.random(len(columns)) * (least - self._first[columns])
         high = most + rng.random(len(columns)) * (self._last[columns] - most)
-        low[rng.random(len(columns)) < _HALF] = -np.inf
-        high[rng.random(len(columns)) < _HALF] = np.inf
+        low[rng.random(len(columns)) < 0.5] = -np.inf  # a bound is as likely as none
+        high[rng.random(len(columns)) < 0.5] = np.inf
         inside = np.flatnonzero(((negative >= low) & (negative <= high)).all(axis=1))
         while len(inside):
             value = negative[int(rng.choice(inside))]

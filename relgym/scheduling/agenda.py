@@ -6,6 +6,7 @@ one that can't be explained costs no more in the mean than a step earns, and no 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Hashable, Iterable
 from typing import Any
 
@@ -43,7 +44,7 @@ class Budget:
     @property
     def left(self) -> int:
         """What may still be spent."""
-        return 2**62 if self._cells is None else max(0, self._cells - self.spent)
+        return sys.maxsize if self._cells is None else max(0, self._cells - self.spent)
 
     def spend(self, cells: int) -> None:
         """Take note of work done."""

@@ -11,16 +11,13 @@ import functools
 from collections.abc import Callable, Generator
 from typing import Any, Generic, ParamSpec, TypeAlias, TypeVar
 
-__all__ = ["CALL", "Resumable", "Steps", "Task", "resumable"]
+__all__ = ["Resumable", "Steps", "Task", "resumable"]
 
 T = TypeVar("T")
 P = ParamSpec("P")
 
 Steps: TypeAlias = Generator[int, None, T]
 """Yields the cells of work done since the last time, and returns the result."""
-
-CALL = 25_000
-"""What a few array operations cost however few numbers they look at, in cells: a tenth of a millisecond."""
 
 
 class Resumable(Generic[P, T]):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.approximation import NORMAL, approximate, reach, terms_of
+from relgym.clustering.approximation import approximate, normal_reach, reach, terms_of
 from relgym.clustering.discovery import Scale, is_law, likeness
 from relgym.config import ClusteringConfig
 from relgym.numeric.ransac import Consensus
@@ -138,7 +138,7 @@ def test_a_line_is_no_series(rng: np.random.Generator) -> None:
 def test_errors_as_small_as_rounding_are_alike() -> None:
     errors = np.linspace(0.0, 1.0, 11)
     assert reach(errors) == pytest.approx(0.9)
-    assert reach(errors, 1.0) == reach(errors / 2.0, 1.0) == NORMAL
+    assert reach(errors, 1.0) == reach(errors / 2.0, 1.0) == normal_reach()
 
 
 def test_the_wider_the_library_the_more_terms() -> None:

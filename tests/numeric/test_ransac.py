@@ -182,7 +182,7 @@ def test_samples_drawn_in_pieces_are_those_drawn_whole(
     found, states, pieces = [], [], []
     for drawn in (1, 10**9):  # sixteen samples at a time, and all of them
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(ransac, "DRAWN", drawn)
+            patch.setattr(ransac, "CACHED", drawn)
             task = Task(draw_samples, n, size, draws, rng=np.random.default_rng(seed), **some)
             task.advance(10**12)
         found.append(task.result)
@@ -190,7 +190,7 @@ def test_samples_drawn_in_pieces_are_those_drawn_whole(
         pieces.append(task.pieces)
     np.testing.assert_array_equal(*found)
     assert states[0] == states[1]
-    assert pieces == [-(-draws // 16), 1]
+    assert pieces == [-(-draws // 16) + 1, 2]
     assert found[0].shape == (draws, min(size, n))
     assert all(len(set(row)) == len(row) for row in found[0].tolist())
     if "anchors" in some:
@@ -205,7 +205,7 @@ def test_samples_are_fitted_in_pieces_as_whole(columns: int, monkeypatch: pytest
     y = np.where(np.arange(80) < 60, 2.0 * x[:, 1] - x[:, 4], rng.normal(size=80))
     found = []
     for chunk in (1, 10**9):
-        monkeypatch.setattr(ransac, "CHUNK", chunk)
+        monkeypatch.setattr(ransac, "CACHED", chunk)
         found.append(search(x, y, np.random.default_rng(0), draws=200))
     assert found[0] is not None and found[1] is not None
     assert found[0].fit == found[1].fit

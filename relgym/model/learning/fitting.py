@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.checks import checked_count
+from relgym.config.constants import MOST_STEPS
 from relgym.errors import DataError, ModelFileError, ObservationError
 from relgym.model.predicting.prequential import StepReport, compared
 from relgym.model.predicting.score import Score
@@ -86,7 +87,7 @@ def progressive(
     learn: bool = True,
 ) -> Iterator[Progress]:
     """Predict each transition, then learn from it; a report after every so many, and one of what remains."""
-    checked_count("every", every, 1, 10**9)
+    checked_count("every", every, 1, MOST_STEPS)
     if learn and model.frozen:
         raise ModelFileError(
             "this model was loaded without its history and can only predict: save it with save(path, history=True) to "

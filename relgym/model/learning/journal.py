@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import LARGE, MORE_ROOM
+from relgym.config.constants import LARGE, MORE_ROOM, MOST_BYTES
 
 __all__ = ["Journal"]
 
@@ -27,9 +27,6 @@ Entry: TypeAlias = tuple[str, tuple[Any, ...]]
 
 STEPS = 1_000
 """A checkpoint is taken after so many steps at the latest: a rollback takes as long as so many steps."""
-
-NUMBERS = 4_000_000
-"""... or after steps of so many numbers together, 32 MB: of large scenes fewer are kept."""
 
 
 class Journal:
@@ -61,7 +58,8 @@ class Journal:
         whole
             Gives all that steps change; called where a checkpoint is due.
         """
-        if self._taken is None or len(self._taken[1]) >= STEPS or self._numbers >= NUMBERS:
+        full = self._numbers * np.float64().nbytes >= MOST_BYTES
+        if self._taken is None or len(self._taken[1]) >= STEPS or full:
             if self._taken is not None:
                 self._needless = self._taken[1]
             self._taken = None  # its copies are about to be overwritten
@@ -108,7 +106,7 @@ class Journal:
         collects = gc.isenabled()
         try:
             gc.disable()  # what is made here goes at once, and so many objects made would have it look through all
-            pickle.Pickler(self._text, protocol=5, buffer_callback=aside).dump(whole)
+            pickle.Pickler(self._text, protocol=pickle.HIGHEST_PROTOCOL, buffer_callback=aside).dump(whole)
         except (AttributeError, TypeError, pickle.PicklingError):
             copied = copy.deepcopy(whole)
             return lambda: copy.deepcopy(copied)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
+from relgym.config.constants import ANSWERS
 from relgym.model.percepts.grouping import distinct
 from relgym.model.percepts.sight import Seen, Sight
 from relgym.model.predicting.regression import Regressed
@@ -53,10 +54,6 @@ class Standing(NamedTuple):
 
 LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
 """The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
-
-MOST_STATES = 4096
-"""Of so many single scenes the relational state is remembered, and where their numbers lie of so many orders of
-objects."""
 
 MOST_SIGHTS = 32
 """For so many layouts the kernel has a work space to look at scenes in, of at most 2 MB."""
@@ -290,7 +287,7 @@ class Perception:
             return order, state_keys(percept.relations.table, layout, body, order)
         key = (id(layout), body, seen.table.tobytes(), seen.order.tobytes())
         if (known := self._states.get(key)) is None:
-            if len(self._states) >= MOST_STATES:
+            if len(self._states) >= ANSWERS:
                 self._states.clear()
             known = self._states[key] = state_keys(seen.table, layout, body, seen.order)
         return seen.order, known
@@ -299,7 +296,7 @@ class Perception:
         """Columns of a regression row in the concatenation of a state vector and its next one; cached."""
         key = (id(layout), order)
         if (known := self._gathers.get(key)) is None:
-            if len(self._gathers) >= MOST_STATES:
+            if len(self._gathers) >= ANSWERS:
                 self._gathers.clear()
             known = self._gathers[key] = sig.gather(layout, order)
         return known

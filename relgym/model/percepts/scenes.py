@@ -26,9 +26,6 @@ __all__ = [
     "wrap",
 ]
 
-TURN = 2.0 * math.pi
-"""A full turn, in radians."""
-
 MOST_LAYOUTS = 256
 """Of so many layouts it is kept in mind what they have in common with another one, or what is predicted in them."""
 
@@ -129,7 +126,7 @@ def unwrapped(
     if not len(columns):
         return following
     turned = following.copy()
-    turned[..., columns] -= TURN * np.round((following[..., columns] - now[..., columns]) / TURN)
+    turned[..., columns] -= math.tau * np.round((following[..., columns] - now[..., columns]) / math.tau)
     return turned
 
 
@@ -137,7 +134,7 @@ def wrap(layout: SceneLayout, following: NDArray[np.float64]) -> None:
     """Bring all angles into [-π, π], in place."""
     columns = angle_columns(layout)
     if len(columns):
-        following[..., columns] -= TURN * np.round(following[..., columns] / TURN)
+        following[..., columns] -= math.tau * np.round(following[..., columns] / math.tau)
 
 
 def next_values(before: Scene, after: Scene) -> NDArray[np.float64]:

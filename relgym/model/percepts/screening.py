@@ -11,12 +11,14 @@ occurrences.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import SUMMABLE
 from relgym.model.percepts.scenes import MOST_LAYOUTS
 from relgym.scene.objects import SceneLayout
 
@@ -42,7 +44,7 @@ REPEATED = 5
 RUN = 8
 """... nor so many in successive transitions: another scale."""
 
-MOST = 1e75
+MOST = math.sqrt(SUMMABLE)
 """Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
 
 

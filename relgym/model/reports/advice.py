@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.approximation import LEFT, NEARLY_ALL, NORMAL, approximate, terms_of
+from relgym.clustering.approximation import LEFT, NEARLY_ALL, approximate, normal_reach, terms_of
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.features import MOST_FEATURES, library_of, offered, switched_on
@@ -194,7 +194,7 @@ def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
     if not parts:
         return math.inf
     # Where no mode applies the error is infinite, and between that and others there is no middle.
-    reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL, method="higher")) / NORMAL
+    reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL, method="higher")) / normal_reach()
     return max(c.scale.sigma, reach)
 
 

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import CALL, EVIDENCE
 from relgym.errors import ConfigError
 from relgym.hypotheses import Examples, Law, code_length, registered
 from relgym.model.target.scope import alike, spread_out
 from relgym.scene.objects import TASK
 from relgym.scheduling.agenda import Budget
-from relgym.scheduling.work import CALL, Steps, Task, resumable
+from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Candidates"]
 

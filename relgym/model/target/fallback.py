@@ -17,9 +17,6 @@ from relgym.model.target.scope import EVERYWHERE
 
 __all__ = ["Fallback"]
 
-_BEYOND = -1
-"""In the place of a mode's id: the guess beyond the scope of approximations."""
-
 
 class Fallback:
     """The guesses of one target, and how far they and its modes go.
@@ -119,7 +116,8 @@ class Fallback:
 
     def guessing(self, signature: SlotSignature, *, beyond: bool = False) -> Binding | None:
         """A guess over a signature's columns: the best one of all, or that beyond the scope of approximations."""
-        best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, _BEYOND)
+        # In the place of a mode's id, -1: that beyond.
+        best, key = (self.guess, NOISE) if not beyond else (self.guess_beyond, -1)
         if best is None:
             return None
         bound = self.bound.of(signature, key, best.mode)

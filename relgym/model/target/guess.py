@@ -283,7 +283,7 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[i
         return None, 1.0
     errors = np.where(sure, np.sqrt(squares.mean(axis=1)), np.inf)
     first = int(np.argmax(errors <= WORSE * errors.min()))
-    return sizes[first], float(errors[first]) / max(float(change.std()), 1e-300)
+    return sizes[first], float(errors[first]) / max(float(change.std()), float(np.finfo(np.float64).tiny))
 
 
 def _order(x: NDArray[np.float64], change: NDArray[np.float64], terms: int) -> Steps[tuple[int, ...]]:

@@ -18,6 +18,7 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.config.constants import TYPICAL
 from relgym.model.target.spread_split import Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
@@ -33,9 +34,6 @@ RECURRING = 0.5
 
 ROUNDING = 0.1
 """A spread below this fraction of the noise assumed is mere rounding, and not worth telling."""
-
-TYPICAL = 0.6745
-"""Median of a normal variable's size, in standard deviations."""
 
 _Action = tuple[float, ...]
 
