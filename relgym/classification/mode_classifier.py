@@ -22,6 +22,7 @@ from relgym.classification.rows import RowPool
 from relgym.classification.views import Context, Scope, View
 from relgym.classification.voting import Voting
 from relgym.config import ClassificationConfig
+from relgym.config.constants import ROUNDED, ROUNDINGS
 
 __all__ = ["ModeClassifier"]
 
@@ -411,4 +412,6 @@ class ModeClassifier:
 
 def _same(a: Floats, b: Floats) -> bool:
     """Whether a function's values moved by no more than rounding."""
-    return bool(np.allclose(a, b, rtol=1e-9, atol=1e-12, equal_nan=True))
+    return bool(
+        np.allclose(a, b, rtol=ROUNDED, atol=ROUNDINGS * float(np.finfo(np.float64).eps), equal_nan=True)
+    )

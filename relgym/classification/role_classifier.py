@@ -17,7 +17,7 @@ from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
-from relgym.config.constants import ANSWERS
+from relgym.config.constants import ANSWERS, SAME_DIGITS
 from relgym.logic.clause import Definition
 from relgym.logic.csp import World, matches
 from relgym.logic.facts import Facts
@@ -306,7 +306,10 @@ class RoleClassifier:
         best: tuple[tuple[float, int], Places] | None = None
         single = True
         for (score, typical), chosen in fillings(self.descriptions, options, frozenset()):
-            total = round(score, 9), typical  # the same scores summed in another order are the same score
+            total = (
+                round(score, SAME_DIGITS),
+                typical,
+            )  # the same scores summed in another order are the same score
             single &= best is None or total != best[0]
             if best is None or total > best[0]:
                 best, single = (total, tuple(each for _, each in sorted(chosen))), True

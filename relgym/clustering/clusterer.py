@@ -20,6 +20,7 @@ from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.clustering.suspects import review_due
 from relgym.config import ClusteringConfig
+from relgym.config.constants import ALIKE
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 
@@ -71,7 +72,7 @@ class ModeClusterer:
     def __init__(self, target: Target, config: ClusteringConfig, *, seed: int) -> None:
         self.population = Population(target, config)
         self.search = ModeSearch(self.population, seed=seed)
-        self.floor = 1e-12
+        self.floor = float(np.finfo(np.float64).eps)
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
         self._sought = 0  # after so many examples the latest one began
@@ -403,7 +404,7 @@ class ModeClusterer:
         self.population.rehome(table, np.arange(first, len(self.population.log)))
         matched = {NOISE: NOISE}
         for i, cluster in sorted(other.clusters.items()):
-            alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, 1e-6)]
+            alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, ALIKE)]
             if alike:
                 matched[i] = alike[0]
             elif (

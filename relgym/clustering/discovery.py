@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
-from relgym.config.constants import CALL, PIVOT, SAMPLES_ALIKE, SAMPLES_TRIED
+from relgym.config.constants import ALIKE, CALL, ROUNDED, SAMPLES_ALIKE, SAMPLES_TRIED
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
     LinearFit,
@@ -138,7 +138,7 @@ def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
     if not steps.min() > 100.0 * scale.tolerance:
         return False
     ratio = steps / steps.min()
-    return bool(np.abs(ratio - np.round(ratio)).max() < 1e-6)
+    return bool(np.abs(ratio - np.round(ratio)).max() < ALIKE)
 
 
 @resumable
@@ -462,7 +462,7 @@ def _unsupported(
             if len(left) <= len(fit.columns) + 2:
                 break
             # Not the largest residual: a row far out in the other columns too draws the regression to itself.
-            stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), PIVOT)
+            stake = np.abs(left) / np.maximum(1.0 - _leverage(x[kept], fit, column), ROUNDED)
             kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
         remaining = np.square(weight * _own_part(x[kept], fit, column))
         yield 2 * support * fitting_cells(len(x), len(fit.columns))
@@ -494,7 +494,7 @@ def _leverage(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np
         for other in spanned:  # not LAPACK, whose results may depend on its threads
             rest = rest - np.add.reduce(other * rest) * other
         size = math.sqrt(float(np.add.reduce(rest * rest)))
-        if size > PIVOT * math.sqrt(float(np.add.reduce(own * own))):
+        if size > ROUNDED * math.sqrt(float(np.add.reduce(own * own))):
             spanned.append(rest / size)
             shares += np.square(spanned[-1])
     return shares
@@ -520,7 +520,7 @@ def _enough_combinations(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
 ) -> bool:
     """Whether slowly changing columns take enough combinations of values to support their weights."""
-    if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < 1e-9:
+    if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < ROUNDED:
         return True  # persistence has no free parameter
     used = np.unique(x[:, list(fit.columns)], axis=0)
     if fit.columns and len(used) <= len(fit.columns) + (fit.intercept != 0.0):

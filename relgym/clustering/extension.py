@@ -22,12 +22,10 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import EXACT, RECENT, SEARCH, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
+from relgym.config.constants import ROUNDED
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
-
-CONSTANT: Final = 1e-9
-"""A column that varies by less, relative to what it does in the unexplained examples, is constant."""
 
 NEWEST: Final = 32
 """At most so many new examples are tried."""
@@ -190,7 +188,7 @@ def _agreeing(
         Of a flag: weights that it has in other modes. None of any other column.
     """
     start = float(off[lead])
-    if start == 0.0 or np.abs(off[:members]).max() > CONSTANT * abs(start):
+    if start == 0.0 or np.abs(off[:members]).max() > ROUNDED * abs(start):
         return None
     weight = float(left[lead]) / start
     fits = np.abs(left - weight * off) <= tolerance

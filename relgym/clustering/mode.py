@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from relgym.config.constants import DIGITS
+from relgym.config.constants import DIGITS, ROUNDED
 from relgym.scene.objects import Target
 
 __all__ = ["NOISE", "Mode", "Role", "sum_text"]
@@ -74,7 +74,7 @@ class Mode:
         """The same mode with another example count."""
         return replace(self, examples=examples)
 
-    def same_function(self, other: Mode, tolerance: float = 1e-9, *, constant: bool = True) -> bool:
+    def same_function(self, other: Mode, tolerance: float = ROUNDED, *, constant: bool = True) -> bool:
         """Whether both have the same roles, weights and (if `constant`) intercept, within `tolerance`."""
         pattern = [(r.type, [p for p, _ in r.terms]) for r in self.roles]
         if pattern != [(r.type, [p for p, _ in r.terms]) for r in other.roles]:

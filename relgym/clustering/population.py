@@ -87,7 +87,7 @@ class Population:
         self.target = target
         self.config = config
         self.clusters: dict[int, Cluster] = {}
-        self.scale = Scale(1e-12, config.inlier_stds, config.tail_stds)
+        self.scale = Scale(float(np.finfo(np.float64).eps), config.inlier_stds, config.tail_stds)
         self.log = AssignmentLog()
         self.next_id = 1
         self.known_noise = 0

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
-from relgym.config.constants import TYPICAL
+from relgym.config.constants import ROUNDED, TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
@@ -183,7 +183,7 @@ def _refined(evidence: Evidence, fit: LinearFit, bits: float, most: int) -> tupl
                 if (not chosen and not constant) or rows.sum() <= len(chosen) + constant:
                     continue
                 other = least_squares(evidence.x[rows], evidence.y[rows], chosen, intercept=constant)
-                if (now := evidence.of(other)) > bits + 1e-9:
+                if (now := evidence.of(other)) > bits + ROUNDED:
                     better, bits = other, now
         if better is fit:
             return fit, bits

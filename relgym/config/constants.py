@@ -9,6 +9,7 @@ import sys
 from typing import Final
 
 __all__ = [
+    "ALIKE",
     "ALL_DIGITS",
     "ANSWERS",
     "BEYOND",
@@ -26,10 +27,11 @@ __all__ = [
     "MORE_ROOM",
     "MOST_BYTES",
     "MOST_STEPS",
-    "PIVOT",
     "POWERS",
     "ROUGH",
+    "ROUNDED",
     "ROUNDINGS",
+    "SAME_DIGITS",
     "SAMPLES_ALIKE",
     "SAMPLES_TRIED",
     "SCENE_ROWS",
@@ -37,8 +39,6 @@ __all__ = [
     "SHORT",
     "STDS",
     "SUMMABLE",
-    "TALLY_DIGITS",
-    "TIE_BITS",
     "TOLD",
     "TYPICAL",
 ]
@@ -46,8 +46,17 @@ __all__ = [
 EVIDENCE: Final = 10.0
 """Bits by which evidence must lead before anything is changed for it: such a lead misleads once in 2^10 times."""
 
-TIE_BITS: Final = 1e-6
-"""Difference in bits that decides nothing: sums of some thousand logarithms are rounded by less."""
+ROUNDED: Final = 1e-9
+"""What differs by so small a share, or by so much of 1, differs by rounding: half of a float's digits, which is what is
+left of them where squares are compared, and more than sums of a million numbers lose. A column whose part orthogonal to
+others, or to 1, is relatively smaller is collinear with them."""
+
+SAME_DIGITS: Final = 9
+"""Digits to which numbers agree that differ by rounding: those of `ROUNDED`."""
+
+ALIKE: Final = 1e-6
+"""What differs by so small a share, or by so many bits, is the same though it was found in another way, fitted to other
+examples or summed up from squares of what differs by rounding: a thousand times `ROUNDED`."""
 
 STDS: Final = 4.0
 """Standard deviations within which an error is noise: a normal one is beyond them once in 16,000 times."""
@@ -96,15 +105,8 @@ CONTACTS_KEPT: Final = 3_000
 POWERS: Final = (1, 2, 3)
 """Powers of extents that inertia and shares may go with: length, area, volume."""
 
-TALLY_DIGITS: Final = 7
-"""Decimals to which sums of examples' weights are compared. Weights are multiples of 1/64 or shares of 1; sums taken in
-another order differ by 1e-12 at most."""
-
 SUMMABLE: Final = 1e146
 """Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
-
-PIVOT: Final = 1e-9
-"""A column whose part orthogonal to others is relatively smaller is collinear with them: half of a float's digits."""
 
 LEAST_EXEMPLARS: Final = 100
 """Classified examples that are kept whatever memory they take: some ten of each mode of a few."""

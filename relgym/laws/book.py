@@ -101,7 +101,7 @@ class LawBook:
         self.shares: dict[Kind, Share] = {}
         self.inertia = Inertia()
         self.turning = any(s.turns for s in sources.values())
-        self.tolerance = 1e-15
+        self.tolerance = float(np.finfo(np.float64).eps)
         self._casts: dict[SceneLayout, Cast] = {}
         self._latest: tuple[SceneLayout, Cast] | None = None
         self._rounded: dict[int, tuple[Cast, NDArray[np.intp]]] = {}

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ROUNDINGS
 from relgym.laws.frames import Bearings, axes_of, axis_names
 from relgym.laws.joints import Joint, Joints
 from relgym.laws.records import AxisLaw, PairLaw
@@ -25,11 +26,6 @@ LEAP = 10
 
 FARTHEST = 100.0
 """Most sweeps that a leap stands for."""
-
-SETTLED = 1e-15
-"""Change of an impulse, in length per step, up to which it has settled; at least a few roundings."""
-
-ROUNDINGS = 8.0 * float(np.finfo(np.float64).eps)
 
 
 class Composed(NamedTuple):
@@ -131,7 +127,8 @@ def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, fre
     if group.pairs.shape[1] == 1:
         settling.sweep()
         return settling.result(settled=True)
-    still = np.maximum(SETTLED, ROUNDINGS * np.abs(free).max(axis=(0, 2)))
+    eps = float(np.finfo(np.float64).eps)
+    still = eps * np.maximum(1.0, ROUNDINGS * np.abs(free).max(axis=(0, 2)))
     before = np.empty(0)
     for sweep in range(1, SWEEPS + 1):
         step = settling.sweep()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import LEFT_OPEN, TYPICAL
+from relgym.config.constants import LEFT_OPEN, ROUNDED, ROUNDINGS, TYPICAL
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
@@ -256,7 +256,7 @@ class FreeLearner:
             if not y[:, k].any():
                 continue  # what never moved scatters by nothing
             columns = x[:, list(self.sources.preference(k))]
-            start = float(np.abs(y[:, k]).max(initial=0.0)) * 1e-12 + 1e-300
+            start = float(np.abs(y[:, k]).max()) * ROUNDINGS * float(np.finfo(np.float64).eps)
             fit = forward_stepwise(columns, y[:, k], sigma=start, max_terms=MOST_TERMS, eliminate=False)
             left.append(float(np.median(np.abs(y[:, k] - fit.predict(columns)))) / TYPICAL)
         return max(left, default=0.0)
@@ -276,7 +276,7 @@ def _simplest(
     fit: LinearFit, names: list[str], x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float
 ) -> Piece:
     """The fit as a piece, weights next to 1 or -1 made exactly that where it explains as much."""
-    weights = [float(round(w)) if abs(abs(w) - 1.0) <= 1e-9 else w for w in fit.weights]
+    weights = [float(round(w)) if abs(abs(w) - 1.0) <= ROUNDED else w for w in fit.weights]
     total = np.zeros(len(y))
     for column, weight in zip(fit.columns, weights, strict=True):
         total = total + weight * x[:, column]

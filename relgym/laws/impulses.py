@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ALIKE, ROUNDED
 from relgym.laws.records import ONE, AxisLaw
 from relgym.scene.geometry.vectors import FloatArray
 
@@ -38,9 +39,6 @@ LOOSE = 1e-5
 A body that lies flat touches in two points, at heights that differ by their overlaps: both can't stick while it turns
 by however little. Impulses against each other then grow from sweep to sweep, and engines stop somewhere.
 """
-
-NULL = 1e-9
-"""Singular values below this share of the largest one count as 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +225,7 @@ def _solved(
     scale = 1.0 / np.sqrt(yields)
     matrix = scale[:, :, None] * matrix * scale[:, None]
     left, sizes, right = np.linalg.svd(matrix)
-    kept = sizes > NULL * sizes[:, :1]
+    kept = sizes > ROUNDED * sizes[:, :1]
     inverse = np.where(kept, 1.0 / np.where(kept, sizes, 1.0), 0.0)
     inside = (left * (scale * value)[:, :, None]).sum(axis=1) * inverse
     x = scale * (right * inside[:, :, None]).sum(axis=1)
@@ -238,7 +236,7 @@ def _solved(
     ray = (left * against[:, None]).sum(axis=2)
     ray = np.where(kept, 0.0, (right * ray[:, None]).sum(axis=2))
     ray = scale * (right * ray[:, :, None]).sum(axis=1)
-    return x, moved.max(axis=(1, 2)) <= 1e3 * NULL, ray
+    return x, moved.max(axis=(1, 2)) <= ALIKE, ray
 
 
 def _leapt(rows: Rows, x: FloatArray, ray: FloatArray, choice: NDArray[np.intp]) -> FloatArray:
@@ -271,7 +269,7 @@ def _until(rows: Rows, here: FloatArray, change: FloatArray, choice: NDArray[np.
     closing = np.concatenate([(growing - rising).reshape(len(here), -1), -change[:, c:, 0]], axis=1)
     ahead = (closing > 0.0) & (left >= 0.0)
     until = np.where(ahead, left / np.where(ahead, closing, 1.0), np.inf).min(axis=1)
-    return np.where(np.isfinite(until), (1.0 + NULL) * until, 0.0)
+    return np.where(np.isfinite(until), (1.0 + ROUNDED) * until, 0.0)
 
 
 def _swept(rows: Rows, start: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import DIGITS, LEFT_OPEN, POWERS, TOLD
+from relgym.config.constants import ALIKE, DIGITS, LEFT_OPEN, POWERS, SAME_DIGITS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -122,7 +122,9 @@ class Inertia:
         mass = self.mass and (
             self.mass.factors, self.mass.by, tuple((n, f"{c:.6g}") for n, c in self.mass.constants)
         )  # fmt: skip
-        return mass, tuple((g.types, g.piece and g.piece.formula(9), g.whole) for g in self.gyrations)
+        return mass, tuple(
+            (g.types, g.piece and g.piece.formula(SAME_DIGITS), g.whole) for g in self.gyrations
+        )
 
     def sentences(self, digits: int = DIGITS) -> tuple[str, ...]:
         """What is known, a sentence each; `parse_inertia` reads them back."""
@@ -331,7 +333,7 @@ def _forms(
         picks = rng.integers(0, n, (2, DRAWS))
         one, other = x[:, picks[0]], x[:, picks[1]]
         determinant = one[0] * other[1] - one[1] * other[0]
-        solved = np.abs(determinant) > 1e-6 * np.hypot(one[0], one[1]) * np.hypot(other[0], other[1])
+        solved = np.abs(determinant) > ALIKE * np.hypot(one[0], one[1]) * np.hypot(other[0], other[1])
         if not solved.any():
             continue
         y0, y1 = pushes.torque[picks[0]][solved], pushes.torque[picks[1]][solved]
@@ -384,7 +386,7 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
             wrong = int((left > 4.0 * tolerance * np.maximum(*masses)).sum())
             bits = sum(np.log2(max(2, len(shared))) + 2.0 for _ in factors) + EXCEPTION_BITS * wrong
             bits += constant * max(0, len(constants) - 1) + float(bool(by))
-            if wrong <= LEFT_OPEN * n and (best is None or bits < best[0] - 1e-6):
+            if wrong <= LEFT_OPEN * n and (best is None or bits < best[0] - ALIKE):
                 best = bits, Mass(factors, by, tuple(sorted(constants.items())), n, wrong)
     return None if best is None else best[1]
 

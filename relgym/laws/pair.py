@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import TIE_BITS, TOLD
+from relgym.config.constants import ALIKE, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, shorter_apart
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.kinds import KindsFit, fit_apart, fit_together
@@ -123,7 +123,7 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
     best: PairFit | None = None
     for draft in sorted(drafts, key=_bits)[:SPLIT]:
         found = draft.split(np.inf if best is None else best.law.bits, rng=rng)
-        if best is None or found.law.bits < best.law.bits - TIE_BITS:
+        if best is None or found.law.bits < best.law.bits - ALIKE:
             best = found
     assert best is not None, "without a limit every frame gives a law"
     return best

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EXTRAPOLATED
+from relgym.config.constants import ALIKE, EXTRAPOLATED, ROUNDED
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
@@ -197,7 +197,7 @@ def _solve(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.f
     (a, b), (c, d) = x[:, 0].T, x[:, 1].T
     determinant = a * d - b * c
     size = np.hypot(a, b) * np.hypot(c, d)
-    solved = np.abs(determinant) > 1e-6 * size
+    solved = np.abs(determinant) > ALIKE * size
     safe = np.where(solved, determinant, 1.0)
     weights = np.stack([(d * y[:, 0] - b * y[:, 1]) / safe, (a * y[:, 1] - c * y[:, 0]) / safe], axis=1)
     return weights, solved
@@ -256,7 +256,7 @@ def fitted(piece: Piece, examples: AxisExamples) -> Piece:
 
 def _round(weight: float) -> float:
     nearest = float(round(weight))
-    return nearest if abs(nearest) == 1.0 and abs(weight - nearest) <= 1e-9 else weight
+    return nearest if abs(nearest) == 1.0 and abs(weight - nearest) <= ROUNDED else weight
 
 
 def _determined(piece: Piece, base: bool, members: AxisExamples, spare: int) -> bool:

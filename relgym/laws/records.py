@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import sum_text
-from relgym.config.constants import DIGITS, LEFT_OPEN
+from relgym.config.constants import ALIKE, DIGITS, LEFT_OPEN, SAME_DIGITS
 from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = [
@@ -36,9 +36,6 @@ Kind: TypeAlias = tuple[str, str]
 """Types of the two bodies of a contact: the first one moves."""
 
 Operator: TypeAlias = Literal["max", "min"]
-
-ALIKE = 1e-6
-"""Grips of different kinds of contacts that differ by at most this are one and the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +123,7 @@ class AxisLaw:
     def says(self) -> tuple[Any, ...]:
         """Operator and pieces of the law and of its alternatives, weights to nine digits, and what it has seen."""
         forms = ((self.operator, self.pieces), *self.alternatives)
-        stated = tuple((o, tuple(piece.formula(9) for piece in pieces)) for o, pieces in forms)
+        stated = tuple((o, tuple(piece.formula(SAME_DIGITS) for piece in pieces)) for o, pieces in forms)
         return stated, self.signs, self.trusted(), self.doubted
 
     def trusted(self, kind: Kind | None = None) -> bool:
@@ -256,7 +253,8 @@ class PairLaw:
         """What the law states: equal for laws that differ in examples and in rounding only."""
         axes = (tuple((law.says(), law.kinds if len(laws) > 1 else ()) for law in laws) for laws in self.axes)
         grips, surfaces = (
-            tuple((kind, f"{value:.9g}") for kind, value in pairs) for pairs in (self.grips, self.surfaces)
+            tuple((kind, f"{value:.{SAME_DIGITS}g}") for kind, value in pairs)
+            for pairs in (self.grips, self.surfaces)
         )
         return self.frame, *axes, *grips, surfaces
 
@@ -428,7 +426,7 @@ class FreeLaw:
 
 
 def _formulas(pieces: tuple[Piece, ...]) -> tuple[str, ...]:
-    return tuple(piece.formula(9) for piece in pieces)
+    return tuple(piece.formula(SAME_DIGITS) for piece in pieces)
 
 
 def _region_to_json(region: Region) -> dict[str, Any]:

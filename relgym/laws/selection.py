@@ -9,7 +9,7 @@ from itertools import combinations, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import TIE_BITS
+from relgym.config.constants import ALIKE, SAME_DIGITS
 from relgym.laws.description import EXCEPTION_BITS, function_bits
 from relgym.laws.pieces import AxisExamples, find_pieces, fitted
 from relgym.laws.records import ZERO, Operator, Piece, combined
@@ -58,10 +58,10 @@ def fit_axis(examples: AxisExamples, *, rng: np.random.Generator) -> AxisFit:
         explained = np.abs(examples.y - after) <= examples.tolerance
         scored.append((_score(examples, [pieces[k] for k in chosen], explained), operator, chosen))
     least = min(score for score, _, _ in scored)
-    best = [(operator, chosen) for score, operator, chosen in scored if score <= least + TIE_BITS]
+    best = [(operator, chosen) for score, operator, chosen in scored if score <= least + ALIKE]
     fits = [_refit(examples, operator, tuple(pieces[k] for k in chosen)) for operator, chosen in best]
     first = fits[0]
-    alternatives = [f for f in fits[1:] if f.bits <= first.bits + TIE_BITS and not _same(f, first)]
+    alternatives = [f for f in fits[1:] if f.bits <= first.bits + ALIKE and not _same(f, first)]
     return AxisFit(
         first.pieces,
         first.operator,
@@ -114,5 +114,7 @@ def _refit(examples: AxisExamples, operator: Operator, pieces: tuple[Piece, ...]
 
 def _same(a: AxisFit, b: AxisFit) -> bool:
     """Whether two laws are the same function as written."""
-    sides = [sorted((sorted((n, round(w, 9)) for n, w in p.terms)) for p in f.pieces) for f in (a, b)]
+    sides = [
+        sorted((sorted((n, round(w, SAME_DIGITS)) for n, w in p.terms)) for p in f.pieces) for f in (a, b)
+    ]
     return sides[0] == sides[1] and (a.operator == b.operator or len(a.pieces) == 1)

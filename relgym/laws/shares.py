@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import POWERS, TOLD
+from relgym.config.constants import POWERS, ROUNDED, TOLD
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -78,7 +78,7 @@ def _trivial(
     if not share.property:
         return False
     values = share_values(share, a, b)[told]
-    return bool(np.ptp(values) <= 1e-9 * np.abs(values).max())
+    return bool(np.ptp(values) <= ROUNDED * np.abs(values).max())
 
 
 def _candidates(names: list[str], median: float, *, alike: bool) -> list[Share]:

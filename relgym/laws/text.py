@@ -9,10 +9,10 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from relgym.clustering.mode import sum_text
-from relgym.config.constants import DIGITS
+from relgym.config.constants import ALIKE, DIGITS, ROUNDED
 from relgym.errors import ConfigError
 from relgym.laws.frames import NORMAL_FRAMES, POINT, axis_names
-from relgym.laws.records import ALIKE, ONE, Kind, PairLaw, Piece
+from relgym.laws.records import ONE, Kind, PairLaw, Piece
 from relgym.scene.axes import Axes
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def world_rows(book: LawBook, type_name: str, incline: float, digits: int = DIGI
 
 
 def _tidy(value: float) -> float:
-    return 0.0 if abs(value) < 1e-15 else value
+    return 0.0 if abs(value) < ROUNDED else value
 
 
 def _cases(
@@ -235,7 +235,7 @@ def _plus(form: _Form, other: Mapping[str, float], weight: float) -> _Form:
     for name, value in other.items():
         was = total.get(name, 0.0)
         now = was + weight * value
-        total[name] = 0.0 if abs(now) <= 1e-14 * abs(was) else now
+        total[name] = 0.0 if abs(now) <= ROUNDED * abs(was) else now
     return {name: value for name, value in total.items() if value != 0.0}
 
 

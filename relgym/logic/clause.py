@@ -16,7 +16,7 @@ from string import ascii_uppercase
 from typing import Any, Final
 
 from relgym.arguments import refusing_calls
-from relgym.config.constants import TALLY_DIGITS
+from relgym.config.constants import SAME_DIGITS
 from relgym.errors import ConfigError
 
 __all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
@@ -285,7 +285,7 @@ class Definition:
     @property
     def rank(self) -> tuple[float, float]:
         """What definitions of one class are compared by, the better one first: errors, then bits."""
-        return round(self.errors, TALLY_DIGITS), round(self.bits, TALLY_DIGITS)
+        return round(self.errors, SAME_DIGITS), round(self.bits, SAME_DIGITS)
 
     @property
     def errors(self) -> float:

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from relgym.config.constants import CALL, SHORT, TALLY_DIGITS
+from relgym.config.constants import CALL, ROUNDED, SAME_DIGITS, SHORT
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
-from relgym.logic.growing import EPS, Growing, Score, Weights
+from relgym.logic.growing import Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
 from relgym.logic.search import Harvest, grow
 from relgym.logic.settings import FoilConfig
@@ -71,18 +71,18 @@ class Cover:
         best = self._definition((yield from self._clauses(replace(self._config, numeric=False), limit)))
         looks = [(False, 1), (True, SHORT)] if self._tables.functions else [(True, SHORT)]
         for pure, enough in looks:
-            if best.errors <= EPS and sum(map(len, best.clauses)) <= enough:
+            if best.errors <= ROUNDED and sum(map(len, best.clauses)) <= enough:
                 break
             clauses = yield from self._clauses(self._config, min(limit, best.bits), pure=pure)
             other = self._definition(clauses)
-            best = other if other.bits < best.bits - EPS else best
+            best = other if other.bits < best.bits - ROUNDED else best
         return replace(best, work=self._work)
 
     def _clauses(self, config: FoilConfig, limit: float, *, pure: bool = False) -> Steps[list[Clause]]:
         """Add clauses, `pure` ones if any, until all is covered or they cost more bits than `limit`."""
         alive = np.ones(self._tables.size, dtype=np.bool_)
         clauses: list[Clause] = []
-        while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > EPS:
+        while len(clauses) < self._config.max_clauses and self._problem.count(alive).positives > ROUNDED:
             clause = yield from self._acceptable(alive, config, pure=pure)
             if clause is None or self._length.clauses([*clauses, clause]) > limit:
                 break
@@ -114,9 +114,9 @@ class Cover:
         for place, growing in enumerate(self._harvests[key].clauses):
             left = Coverage(float(growing.left.positives), float(growing.left.negatives))
             bits = self._length.literals(growing.literals, self._tables.arity)
-            clean = pure and left.negatives <= EPS
+            clean = pure and left.negatives <= ROUNDED
             value = left.positives * information - bits if clean else self._length.saving(bits, left, whole)
-            keys[place] = (not clean, -round(value, TALLY_DIGITS), round(bits, TALLY_DIGITS), place)
+            keys[place] = (not clean, -round(value, SAME_DIGITS), round(bits, SAME_DIGITS), place)
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
     def _harvest(self, alive: Bool, config: FoilConfig) -> Steps[Harvest]:
@@ -130,7 +130,7 @@ class Cover:
         return grow.steps(tables, classes, config, self._length)
 
     def _accepts(self, clause: Clause, covered: Coverage, whole: Coverage) -> bool:
-        if covered.positives <= covered.negatives + EPS or covered.precision < self._config.min_precision:
+        if covered.positives <= covered.negatives + ROUNDED or covered.precision < self._config.min_precision:
             return False
         return not self._config.mdl or self._length.saving(self._length.clause(clause), covered, whole) > 0
 
@@ -139,7 +139,7 @@ class Cover:
         matched = [self._problem.matches(clause) for clause in clauses]
         for place in reversed(range(len(clauses))):
             others = matched[:place] + matched[place + 1 :]
-            if others and self._errors(others) <= self._errors(matched) + EPS:
+            if others and self._errors(others) <= self._errors(matched) + ROUNDED:
                 matched, clauses = others, clauses[:place] + clauses[place + 1 :]
         return clauses
 

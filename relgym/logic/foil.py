@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from relgym.arguments import array_of
+from relgym.config.constants import ROUNDED
 from relgym.errors import ConfigError
 from relgym.logic.clause import Definition
 from relgym.logic.cover import Cover
 from relgym.logic.facts import Facts, Float, Int
-from relgym.logic.growing import EPS
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps, resumable
@@ -94,10 +94,10 @@ def learn_both(
     """
     task = _cover(facts, positives, negatives, pos_weights, neg_weights, config)
     given = yield from task.solve()
-    if given.errors <= EPS and sum(map(len, given.clauses)) <= 1:
+    if given.errors <= ROUNDED and sum(map(len, given.clauses)) <= 1:
         return given  # one literal without errors: the other side can't be told more simply
     # nothing beats a definition without errors but one of fewer bits
-    other = yield from task.swapped().solve(given.bits if given.errors <= EPS else math.inf)
+    other = yield from task.swapped().solve(given.bits if given.errors <= ROUNDED else math.inf)
     work = given.work + other.work
     if other.rank < given.rank:
         return replace(other, negated=True, work=work)

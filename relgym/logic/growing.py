@@ -8,23 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import TALLY_DIGITS
+from relgym.config.constants import ROUNDED, SAME_DIGITS
 from relgym.logic import clause as logic
 from relgym.logic.facts import Bool, Float
 from relgym.logic.tables import Tables
 
-__all__ = ["EPS", "Counts", "Growing", "Score", "Tensor", "Weights", "extend"]
+__all__ = ["Counts", "Growing", "Score", "Tensor", "Weights", "extend"]
 
 Tensor: TypeAlias = NDArray[np.float32]
 """Numbers of bindings; small integers, exact in float32."""
-
-EPS: Final = 1e-7
-"""Weights below this are crumbs that sums of fractions leave where nothing is left."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +109,7 @@ class Score:
 
     def __call__(self, counts: Counts) -> Float:
         """Return the scores, rounded so that sums in another order rank the same."""
-        some = counts.positives > EPS
+        some = counts.positives > ROUNDED
         if self._choice == "negatives":
             return _rounded(np.where(some, self._negatives - counts.negatives, -np.inf))
         good = np.where(some, counts.good, 1.0)
@@ -121,7 +118,7 @@ class Score:
 
 
 def _rounded(values: Float) -> Float:
-    return np.round(values, TALLY_DIGITS)
+    return np.round(values, SAME_DIGITS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

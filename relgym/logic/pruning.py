@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from relgym.config.constants import TALLY_DIGITS
+from relgym.config.constants import ROUNDED, SAME_DIGITS
 from relgym.logic.batch import extremes, matches
 from relgym.logic.clause import Clause, Coverage, Literal
 from relgym.logic.facts import Bool, Facts, Float, Int
@@ -72,7 +72,7 @@ def prune(clause: Clause, problem: Problem) -> Clause:
 def _value(clause: Clause, problem: Problem) -> tuple[float, float]:
     covered = problem.count(problem.matches(clause))
     # rounded: the same tuples summed in another order are the same weight
-    return round(covered.positives, TALLY_DIGITS), round(covered.negatives, TALLY_DIGITS)
+    return round(covered.positives, SAME_DIGITS), round(covered.negatives, SAME_DIGITS)
 
 
 def center_thresholds(clause: Clause, problem: Problem) -> Clause:
@@ -116,7 +116,7 @@ def _widest_cut(values: Float, inside: Bool, problem: Problem, below: bool) -> t
     now = problem.count(inside & np.isfinite(values))
     ends = np.sort([values[order][:-1], values[order][1:]], axis=0)
     gaps = ends[1] - ends[0]
-    slack = 1e-9 * (1.0 + now.total)
+    slack = ROUNDED * (1.0 + now.total)
     allowed = (
         (gaps > rounding(values[order])) & (good >= now.positives - slack) & (bad <= now.negatives + slack)
     )

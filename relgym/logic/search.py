@@ -10,11 +10,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CALL, TALLY_DIGITS
+from relgym.config.constants import CALL, ROUNDED, SAME_DIGITS
 from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
-from relgym.logic.growing import EPS, Counts, Growing, Score, Weights, extend
+from relgym.logic.growing import Counts, Growing, Score, Weights, extend
 from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.logic.thresholds import signs_differ
@@ -106,8 +106,10 @@ def _new(children: Iterator[Growing], wanted: int, pool: dict[bytes, Growing]) -
 
 def _promising(beam: Sequence[Growing], pool: Iterable[Growing]) -> list[Growing]:
     """Leave out clauses that can't cover more positives without negatives than a clause already does."""
-    reached = max((float(each.left.positives) for each in pool if each.left.negatives <= EPS), default=0.0)
-    return [each for each in beam if each.left.negatives > EPS and each.left.positives > reached]
+    reached = max(
+        (float(each.left.positives) for each in pool if each.left.negatives <= ROUNDED), default=0.0
+    )
+    return [each for each in beam if each.left.negatives > ROUNDED and each.left.positives > reached]
 
 
 def _may_pay(growing: Growing, arity: int, length: DescriptionLength, whole: Coverage) -> bool:
@@ -161,11 +163,11 @@ class _Candidates:
             bindings = np.repeat([float(g.left.good + g.left.bad) for g, _ in self._blocks], sizes)
             self._introduced = self._join(Block.introduced)
             self._score = score(counts) - self._prices(sizes)
-            self._positives = np.round(counts.positives, TALLY_DIGITS)
-            self._negatives = np.round(counts.negatives, TALLY_DIGITS)
+            self._positives = np.round(counts.positives, SAME_DIGITS)
+            self._negatives = np.round(counts.negatives, SAME_DIGITS)
             # useful is what introduces a variable or leaves fewer bindings than there were
-            fewer = bindings - counts.good - counts.bad > EPS
-            self._useful = (self._positives > EPS) & ((self._introduced > 0) | fewer)
+            fewer = bindings - counts.good - counts.bad > ROUNDED
+            self._useful = (self._positives > ROUNDED) & ((self._introduced > 0) | fewer)
             names, of_one = self._join(lambda block: block.names), self._join(Block.of_one)
             self._ties = (names, of_one, -self._positives, self._introduced, negated, numeric)
 

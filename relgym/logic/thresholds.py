@@ -13,17 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALL_DIGITS
+from relgym.config.constants import ALL_DIGITS, ROUNDED
 from relgym.logic.facts import Float, Int
 
 __all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_between"]
 
 _MAX_BINS: Final = 128
 """Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
-
-_ROUNDING: Final = 1e-10
-"""Values that differ by less, relative to the greatest of them, or to 1 if that is more, are the same number, computed
-in two ways: how far things that touch are apart is what their positions are rounded by."""
 
 _CLEAR: Final = 0.01
 """A number counts as inside a gap if it keeps this share of the gap's width from either end."""
@@ -103,8 +99,11 @@ def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Fl
 
 
 def rounding(values: Float) -> float:
-    """Return the difference up to which two of some finite values count as equal: see `_ROUNDING`."""
-    return _ROUNDING * float(np.abs(values).max(initial=1.0))
+    """Return the difference up to which two of some finite values are the same number, computed in two ways.
+
+    Relative to the greatest of them, or to 1: how far things that touch are apart is what positions are rounded by.
+    """
+    return ROUNDED * float(np.abs(values).max(initial=1.0))
 
 
 def signs_differ(low: Float | float, high: Float | float) -> NDArray[np.bool_] | bool:

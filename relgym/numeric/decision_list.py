@@ -16,6 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ROUNDED
+
 __all__ = ["Rule", "decision_list"]
 
 BEAM: Final = 12
@@ -122,7 +124,7 @@ def _distinct(
     votes = np.zeros((len(rows), allowed.shape[1]))
     np.add.at(votes, which, allowed * weights[:, None])
     heavy: _Floats = np.bincount(which, weights, minlength=len(rows)).astype(np.float64)
-    labels: _Bools = votes >= heavy[:, None] * (1.0 - 1e-9)
+    labels: _Bools = votes >= heavy[:, None] * (1.0 - ROUNDED)
     none = ~labels.any(axis=1)
     labels[none] = votes[none] >= votes[none].max(axis=1, keepdims=True)
     unsure = np.ones(len(rows), dtype=np.bool_)
@@ -218,7 +220,7 @@ def _best(literals: _Bools, labels: _Bools, size: _Floats, prices: _Floats, defa
     best: tuple[float, _Draft] | None = None
     for label in range(labels.shape[1]):
         found = _conjunction(literals, labels[:, label], needed, prices)
-        if found is not None and (best is None or found[0] > best[0] + 1e-12):
+        if found is not None and (best is None or found[0] > best[0] + ROUNDED):
             best = (found[0], (found[1], label))
     assert best is not None, "rows that differ in no condition have a common label"
     return best[1]
@@ -272,7 +274,7 @@ def _improved(table: _Table, rules: list[_Draft], default: int) -> list[_Draft]:
             if not table.right(changed, default):
                 continue
             shorter = table.pruned(changed, default)
-            if (found := table.price(shorter)) < price - 1e-9:
+            if (found := table.price(shorter)) < price - ROUNDED:
                 rules, price, better = shorter, found, True
                 break
     return rules

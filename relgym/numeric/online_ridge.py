@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CACHED, SUMMABLE
+from relgym.config.constants import ALIKE, CACHED, SUMMABLE
 
 __all__ = ["OnlineRidge", "in_order"]
 
@@ -109,7 +109,7 @@ class OnlineRidge:
         covariance = self._gram[1:, 1:] / n - mean[:, None] * mean
         variance = covariance.diagonal()
         # What differs by rounding alone is constant.
-        std = np.sqrt(np.where(variance > 1e-12 * (variance + np.square(mean)), variance, np.inf))
+        std = np.sqrt(np.where(variance > ALIKE**2 * (variance + np.square(mean)), variance, np.inf))
         std_of = np.where(np.isfinite(std), std, 1.0)
         alive = np.isfinite(std)
         scaled = np.where(alive[:, None] & alive, covariance / (std_of[:, None] * std_of), 0.0)

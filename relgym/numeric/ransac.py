@@ -19,9 +19,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CACHED, CALL, EXTRAPOLATED, SAMPLES_ALIKE, SAMPLES_TRIED, STDS
+from relgym.config.constants import (
+    ALIKE,
+    CACHED,
+    CALL,
+    EXTRAPOLATED,
+    ROUNDED,
+    SAMPLES_ALIKE,
+    SAMPLES_TRIED,
+    STDS,
+)
 from relgym.numeric.stepwise import (
-    COARSE,
     MANY,
     LinearFit,
     eliminate_backward,
@@ -234,7 +242,7 @@ def choose_columns(
         if across is not None:
             a -= across * np.add.reduce(across * a, axis=0)
             pivots = np.add.reduce(np.square(a), axis=0)
-        usable = (pivots > 1e-16 * sizes) & (sizes > 0.0)
+        usable = (pivots > ROUNDED**2 * sizes) & (sizes > 0.0)
         along = np.add.reduce(a * residual.T[:, :, None], axis=0)
         gains = np.square(along) / np.where(usable, pivots, np.inf)
         best, found = _best_columns(gains, usable, left, len(a) * sigma**2)
@@ -262,7 +270,7 @@ def _choose_among_many(
         open_ = left > enough
         if not open_.any():
             break
-        usable = (pivots > COARSE**2 * sizes) & (sizes > 0.0)
+        usable = (pivots > ALIKE**2 * sizes) & (sizes > 0.0)
         gains = np.square(np.einsum("di,dij->dj", residual, a)) / np.where(usable, pivots, np.inf)
         best, found = _best_columns(gains, usable, left, size * sigma**2)
         take = open_ & found

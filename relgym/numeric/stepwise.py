@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CALL, PIVOT
+from relgym.config.constants import ALIKE, CALL, ROUNDED
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
@@ -35,9 +35,8 @@ __all__ = [
 
 _Size = TypeVar("_Size", float, NDArray[np.float64])
 
-MANY, COARSE = 64, 1e-6
-"""More candidates than this, non-linear features, are chosen from in a cheaper way that tells collinear columns by so
-much."""
+MANY = 64
+"""More candidates than this, non-linear features, are chosen from in a cheaper way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +76,7 @@ class LinearFit:
 def varying_columns(x: NDArray[np.float64]) -> NDArray[np.intp]:
     """Indices of the columns of `x` that aren't constant (relative to their size)."""
     spread = x.max(axis=0) - x.min(axis=0)
-    return np.flatnonzero(spread > 1e-12 * np.abs(x).max(axis=0, initial=0.0))
+    return np.flatnonzero(spread > ROUNDED * np.abs(x).max(axis=0, initial=0.0))
 
 
 def least_squares(
@@ -178,7 +177,7 @@ def _factors(a: NDArray[np.float64]) -> _Factors:
                 r[:k, k] += parts
                 column -= np.add.reduce(q[:k] * parts[:, None], axis=0)
         left = _length(column)
-        if left > PIVOT * size:
+        if left > ROUNDED * size:
             np.divide(column, left, out=q[k])
             r[k, k] = left
     return _Factors(q, r)
@@ -251,7 +250,7 @@ def _choose(
     sizes, chosen = np.square(a).sum(axis=0), list[int]()
     while len(chosen) < limit:
         pivots = np.square(a).sum(axis=0)
-        usable = pivots > PIVOT**2 * sizes
+        usable = pivots > ROUNDED**2 * sizes
         gains = np.zeros(len(sizes))
         gains[usable] = np.square((a[:, usable] * residual[:, None]).sum(axis=0)) / pivots[usable]
         best = _first_of_the_best(gains, len(residual), sigma)
@@ -271,12 +270,12 @@ def _choose_among_many(
 ) -> Steps[list[int]]:
     """The same at a fraction of the cost: only what is left of the columns' squares is kept up to date.
 
-    That is less exact for columns that are nearly collinear with the chosen ones, hence `COARSE`.
+    That is less exact for columns that are nearly collinear with the chosen ones, hence `ALIKE`.
     """
     sizes = np.einsum("ij,ij->j", a, a)
     pivots, basis, chosen = sizes.copy(), list[NDArray[np.float64]](), list[int]()
     while len(chosen) < limit:
-        usable = pivots > COARSE**2 * sizes
+        usable = pivots > ALIKE**2 * sizes
         gains = np.zeros(len(sizes))
         gains[usable] = np.square(np.einsum("i,ij->j", residual, a)[usable]) / pivots[usable]
         best = _first_of_the_best(gains, len(residual), sigma)
@@ -296,7 +295,7 @@ def _choose_among_many(
 
 def equal_gains(noise: _Size, whole: _Size) -> _Size:
     """Gains that differ by no more are equal: four times what noise leaves in the rows, or rounding of the whole."""
-    found: _Size = np.maximum(4.0 * noise, 1e-12 * whole)
+    found: _Size = np.maximum(4.0 * noise, ROUNDED * whole)
     return found
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CACHED, CALL
+from relgym.config.constants import CACHED, CALL, ROUNDED
 from relgym.errors import ConfigError
 from relgym.scheduling.work import Steps, resumable
 
@@ -24,9 +24,6 @@ __all__ = ["DecisionTree", "learn_tree"]
 
 _Float1D: TypeAlias = NDArray[np.float64]
 _Float2D: TypeAlias = NDArray[np.float64]
-
-_ROUNDING = 1e-10  # values that differ by less, relative to the greatest, are equal
-_TIE = 1e-9  # entropies (bits per example) closer than this are equal: the wider gap decides
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,11 +244,11 @@ class _Grower:
             cuts += int(counts.sum())
             for k in np.flatnonzero(counts).tolist():
                 among = entropies[k]
-                near = np.flatnonzero(among <= among.min() + _TIE)
+                near = np.flatnonzero(among <= among.min() + ROUNDED)
                 pick = near[np.argmax(gaps[k, near])]
                 entropy, gap = float(among[pick]), float(gaps[k, pick])
-                closer = best is None or entropy < best[0] - _TIE
-                if closer or (best is not None and entropy <= best[0] + _TIE and -gap < best[1]):
+                closer = best is None or entropy < best[0] - ROUNDED
+                if closer or (best is not None and entropy <= best[0] + ROUNDED and -gap < best[1]):
                     best = entropy, -gap, first + k, float(thresholds[k, pick])
         return best, cuts
 
@@ -273,7 +270,7 @@ class _Grower:
         with np.errstate(invalid="ignore"):  # what isn't finite is cut off below
             step = higher - lower
             known = np.where(np.arange(n) < finite, np.abs(values), 0.0)
-            same = _ROUNDING * known.max(axis=1, keepdims=True)
+            same = ROUNDED * known.max(axis=1, keepdims=True)
             may = (step > same) & (place >= self.min_leaf - 1) & (place < n - self.min_leaf)
             may &= place < finite - 1
             # "Is it defined at all?"

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.config.constants import EVIDENCE, LEFT_OPEN, STDS
+from relgym.config.constants import ALIKE, EVIDENCE, LEFT_OPEN, STDS
 from relgym.laws.columns import Sources
 from relgym.laws.description import EXCEPTION_BITS, piece_bits
-from relgym.laws.records import ALIKE, Piece
+from relgym.laws.records import Piece
 from relgym.model.parts import Parts
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise

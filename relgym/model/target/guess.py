@@ -288,7 +288,7 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[i
 
 def _order(x: NDArray[np.float64], change: NDArray[np.float64], terms: int) -> Steps[tuple[int, ...]]:
     """Columns in the order in which they serve."""
-    return forward_order.steps(x, change, sigma=1e-12, max_terms=terms)
+    return forward_order.steps(x, change, sigma=float(np.finfo(np.float64).eps), max_terms=terms)
 
 
 def _fitted(

@@ -17,7 +17,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import STDS
+from relgym.config.constants import ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
 from relgym.model.predicting.calibration import OWN, Calibration, Key
 from relgym.model.predicting.prediction import Outcome, Prediction, ScenePrediction
@@ -40,7 +40,7 @@ __all__ = [
     "restore_calibration",
 ]
 
-WRONG = 1e-9
+WRONG = ROUNDED
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
 
 WINDOW, LEAST = 200, 50

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,10 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode, sum_text
+from relgym.config.constants import ALIKE
 from relgym.model.target.limits import EXPLAINED, LATEST, constants, furthest
 
 __all__ = ["Landing", "Stop", "Stops", "find_stops"]
-
-LIKE: Final = 1e-6
-"""Values of one column that differ by less than this part of its range are the same."""
 
 Follows: TypeAlias = Sequence[tuple[str, float]]
 """Properties that follow the target, and k: ``name' = name + k * target'``."""
@@ -212,7 +210,7 @@ def _stops(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: str,
     every = _values(table, clusterer.rows, prop + PRIME)
     if not len(held) or not np.isfinite(every).all():
         return []
-    slack = LIKE * float(np.ptp(every))
+    slack = ALIKE * float(np.ptp(every))
     now = _values(table, clusterer.rows[held], prop)
     found, explained = [], np.zeros(len(held), dtype=bool)
     for side, bound in ((-1.0, float(every.min())), (1.0, float(every.max()))):
@@ -232,7 +230,7 @@ def _landing(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: st
     if not held.any() or not np.isfinite(every).all():
         return None
     at = float(np.median(every[held]))
-    slack = LIKE * float(np.ptp(every))
+    slack = ALIKE * float(np.ptp(every))
     there = np.abs(every - at) <= slack
     if there[held].mean() < EXPLAINED or held[there].mean() < EXPLAINED:
         return None
