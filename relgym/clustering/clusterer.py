@@ -13,21 +13,18 @@ from relgym.clustering.assignments import AssignmentLog
 from relgym.clustering.discovery import Scale, least_examples
 from relgym.clustering.em import Cluster, refit
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.last_resort import APPROXIMATE_AT, Resort, timely
+from relgym.clustering.last_resort import Resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
-from relgym.clustering.suspects import review_due
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE
+from relgym.config.constants import ALIKE, FIRST, HOPELESS, OFTEN, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
+from relgym.scheduling.renewal import due
 
 __all__ = ["ClusterReport", "ModeClusterer"]
-
-ESTIMATE_AT = (64, 512, 4096)
-"""Numbers of examples after which the noise is estimated anew."""
 
 ESTIMATE = 1_500_000
 """What an estimate costs, in cells."""
@@ -201,7 +198,7 @@ class ModeClusterer:
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self.search.discover(table, example, budget)
-        reassigned = review_due(self.seen) and self._review(table)
+        reassigned = self.seen >= HOPELESS and due(self.seen, FIRST, OFTEN) and self._review(table)
         self.due |= self._timely(table)
         self.approximate_now(table, budget)
         after = set(self.clusters)
@@ -232,7 +229,7 @@ class ModeClusterer:
 
     def _append(self, table: ExampleTable, row: int, y: float, budget: Budget) -> int:
         example = self.population.log.append(row, y)
-        self._estimating |= self.seen in ESTIMATE_AT
+        self._estimating |= due(self.seen, FIRST, SELDOM)
         core = table.signatures[table.signature_ids[row]].core
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
         # Of many targets not all estimate in the same step.
@@ -360,7 +357,7 @@ class ModeClusterer:
         if self._resort is None:
             if self._anew and self.search.tried:  # for laws, in vain
                 self._anew = False
-                self.due |= self.config.noise_std == "auto" and self.seen >= APPROXIMATE_AT[0]
+                self.due |= self.config.noise_std == "auto" and self.seen >= HOPELESS
             if not self.due or not budget.left or self._anew:
                 return False  # what waits holds no data
             self.due = False

@@ -34,16 +34,12 @@ from relgym.clustering.approximation import (
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
+from relgym.config.constants import FIRST, HOPELESS, OFTEN, SELDOM
 from relgym.numeric.stepwise import LinearFit
+from relgym.scheduling.renewal import due
 from relgym.scheduling.work import Task
 
-__all__ = ["APPROXIMATE_AT", "LastResort", "Resort", "last_resort", "timely"]
-
-APPROXIMATE_AT = (256, 1024, 4096, 16384)
-"""Numbers of examples after which an approximation is sought, if most of them are unexplained."""
-
-OFTENER_AT = (512, 1536, 2048, 3072, 6144, 8192, 12288)
-"""Among features also after these, since more examples choose better among many: unless noise is what is left."""
+__all__ = ["LastResort", "Resort", "last_resort", "timely"]
 
 MOST_ROWS = 1500
 """At most so many rows, the newest, determine an approximation."""
@@ -62,9 +58,14 @@ class LastResort:
 
 
 def timely(population: Population, table: ExampleTable, *, again: bool) -> bool:
-    """Whether it is time to look for an approximation; `again`: there is one already."""
-    if population.seen in APPROXIMATE_AT or population.seen not in OFTENER_AT:
-        return population.seen in APPROXIMATE_AT
+    """Whether it is time to look for an approximation; `again`: there is one already.
+
+    Among features it is looked for oftener, since more examples choose better among many: unless noise is what is left.
+    """
+    if population.seen < HOPELESS or due(population.seen, FIRST, SELDOM):
+        return population.seen >= HOPELESS
+    if not due(population.seen, FIRST, OFTEN):
+        return False
     signature, recent = _recent(population, table)
     slots = table.signatures[signature]
     if not slots.features or not again:

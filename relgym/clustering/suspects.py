@@ -20,10 +20,7 @@ from relgym.config.constants import ROUNDED, TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
-__all__ = ["FIRST", "Evidence", "likeliest", "review_due", "suspects"]
-
-FIRST = 512
-"""Suspects are looked at for the first time after so many examples."""
+__all__ = ["Evidence", "likeliest", "suspects"]
 
 BADLY = 2.0
 """Examples of a state are suspects if their errors' mean square is so many times the noise's variance, or what
@@ -40,17 +37,6 @@ CAPPED, CLOSE = 6.0, 3.0
 
 TRIALS, LEAST_DRAWS, MOST_DRAWS = 2_000, 20, 120
 """Functions tried on samples: about so many in all, from so many samples."""
-
-
-def review_due(seen: int) -> bool:
-    """Whether it is time to look at the suspects: four times while the number of examples doubles.
-
-    Examples
-    --------
-    >>> [n for n in range(2_000) if review_due(n)]
-    [512, 640, 768, 896, 1024, 1280, 1536, 1792]
-    """
-    return seen >= FIRST and seen % (1 << (seen.bit_length() - 3)) == 0
 
 
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:

@@ -19,6 +19,7 @@ __all__ = [
     "DIGITS",
     "EVIDENCE",
     "EXTRAPOLATED",
+    "FIRST",
     "FIRST_ROOM",
     "HOPELESS",
     "LARGE",
@@ -27,6 +28,7 @@ __all__ = [
     "MORE_ROOM",
     "MOST_BYTES",
     "MOST_STEPS",
+    "OFTEN",
     "POWERS",
     "ROUGH",
     "ROUNDED",
@@ -36,6 +38,7 @@ __all__ = [
     "SAMPLES_TRIED",
     "SCENE_ROWS",
     "SEARCHED_CELLS",
+    "SELDOM",
     "SHORT",
     "STDS",
     "SUMMABLE",
@@ -77,6 +80,18 @@ TOLD: Final = 100.0
 
 BEYOND: Final = 0.5
 """Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
+
+FIRST: Final = 64
+"""Examples that something is fitted to for the first time; from then on whenever there are so many times as many
+(`relgym.scheduling.renewal`). So many tell a standard deviation to 9 %, 1 / sqrt(2 n)."""
+
+OFTEN: Final = 1.5
+"""What lags behind is fitted anew when there are so many times as many examples: a third of them is new then, and all
+fits before the latest one cost twice as much as that."""
+
+SELDOM: Final = 4
+"""What shouldn't come and go, such as the noise, is estimated anew when there are so many times as many examples: what
+is left to chance is half as much then."""
 
 HOPELESS: Final = 200
 """Examples among which there is a law, or it is doubtful that there is one: five times what the thesis' modes need."""

@@ -20,6 +20,7 @@ from relgym.numeric.changes import changed_at
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise
 from relgym.scene.geometry.vectors import FloatArray
+from relgym.scheduling.renewal import due
 
 __all__ = ["FreeLearner", "free_motion"]
 
@@ -93,7 +94,7 @@ class FreeLearner:
         if not np.isfinite(x).all():
             return False
         self.store.add(np.concatenate([x, after]), cell=int(not right))
-        if right and not _power_of_two(self.seen):
+        if right and not due(self.seen, 1):
             return False
         self._news += 1
         if len(self.store.rows) < FEWEST or self._news <= self._patience():
@@ -103,7 +104,7 @@ class FreeLearner:
 
     def confirms(self, more: int) -> bool:
         """Whether so many more examples that the law explains change nothing but the choice of those kept."""
-        return not any([_power_of_two(self.seen + k + 1) for k in range(more)])
+        return not any([due(self.seen + k + 1, 1) for k in range(more)])
 
     def confirm(self, x: NDArray[np.float64], after: NDArray[np.float64]) -> None:
         """`learn_one` of an example that the law explains, where `confirms` says that this is all."""
@@ -299,7 +300,3 @@ def _bits(
 
 def _law_bits(law: FreeLaw) -> float:
     return law.bits
-
-
-def _power_of_two(n: int) -> bool:
-    return n & (n - 1) == 0

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import LEFT_OPEN, ROUNDINGS, STDS, TOLD
+from relgym.config.constants import FIRST, LEFT_OPEN, ROUNDINGS, SELDOM, STDS, TOLD
 from relgym.laws.book import SPREAD, LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
@@ -33,11 +33,9 @@ from relgym.laws.touching import Cast, Contacts
 from relgym.laws.turning import PushStore
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
+from relgym.scheduling.renewal import due
 
 __all__ = ["LawLearner"]
-
-ESTIMATE_AT = (64, 256, 1024)
-"""Numbers of free examples at which the noise is estimated, if the free law doesn't hold exactly."""
 
 
 class LawLearner:
@@ -252,7 +250,7 @@ class LawLearner:
         for name, more in counts.items():
             learner = self._free[name]
             seen = range(learner.seen + 1, learner.seen + more + 1)
-            if not learner.confirms(more) or any([k in ESTIMATE_AT for k in seen]):
+            if not learner.confirms(more) or any([due(k, FIRST, SELDOM) for k in seen]):
                 return False
         return True
 
@@ -285,7 +283,7 @@ class LawLearner:
         self._drift[name].add(cast.layout.names[cast.layout.bodies[body]], now, after[:d])
         after = after[: len(learner.sources.moving)]
         changed = learner.learn_one(motion.columns[body][:, 0], after, right, self.book.tolerance)
-        if learner.seen in ESTIMATE_AT and self._noise is None:
+        if due(learner.seen, FIRST, SELDOM) and self._noise is None:
             changed |= self._estimate(learner, self._drift[name])
         if learner.law is not None:  # more examples may have changed its last digits
             self.book.free[name] = learner.law
@@ -533,4 +531,4 @@ def _part(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[
 
 def _doubled(seen: int, more: int) -> bool:
     """Whether the number of contacts has just passed a power of two."""
-    return seen >= 8 and seen.bit_length() != (seen - more).bit_length()
+    return seen.bit_length() != (seen - more).bit_length()

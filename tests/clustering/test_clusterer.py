@@ -157,10 +157,10 @@ def test_noise_that_the_first_few_examples_overrated_is_lowered(rng: np.random.G
     x = rng.normal(size=(700, 3)) * (1.0, 1.0, 0.3)
     y = x[:, 0] + 0.2 * x[:, 1] + 0.1 * x[:, 2]
     y[:64] += rng.normal(scale=0.05, size=64)
-    stream.feed(x[:500], y[:500])
+    stream.feed(x[:250], y[:250])
     assert stream.clusterer.scale.sigma > 0.01
-    assert stream.counts() == {"noise": 500}
-    stream.feed(x[500:], y[500:])
+    assert stream.counts() == {"noise": 250}
+    stream.feed(x[250:], y[250:])
     assert stream.clusterer.scale.sigma < 1e-10
     assert stream.counts() == {"v' = v + 0.2 w + 0.1 a": 636, "noise": 64}
 

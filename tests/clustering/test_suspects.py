@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from streams import Stream
 
 from relgym.clustering.discovery import Scale
-from relgym.clustering.suspects import FIRST, MOST, Evidence, likeliest, review_due, suspects
+from relgym.clustering.suspects import MOST, Evidence, likeliest, suspects
 from relgym.config import ClusteringConfig
 from relgym.numeric.stepwise import LinearFit
 
@@ -20,11 +20,6 @@ SCALE = Scale(SIGMA, 4.0, 6.0)
 
 
 # ---------------------------------------------------------------------- when and where
-def test_reviews_come_four_times_while_the_examples_double() -> None:
-    due = [n for n in range(4 * FIRST) if review_due(n)]
-    assert due == [512, 640, 768, 896, 1024, 1280, 1536, 1792]
-
-
 def test_suspects_are_all_examples_of_states_that_are_explained_badly() -> None:
     strata = np.array([7, 3, 3, 7, 5, 3, 7, 7])
     errors = SIGMA * np.array([0.1, 2.5, 0.0, 0.3, 1.3, 2.0, 0.2, 0.1])
@@ -133,7 +128,7 @@ def test_a_stream_through_much_noise_learns_its_rare_mode(
 
 
 def test_reviews_say_that_examples_were_assigned_anew(rng: np.random.Generator) -> None:
-    assert reviews(ClusteringConfig(noise_std=4e-3), rng) == [512, 640]
+    assert reviews(ClusteringConfig(noise_std=4e-3), rng) == [216, 324, 486]
 
 
 def test_a_world_of_one_state_is_not_reviewed(rng: np.random.Generator) -> None:

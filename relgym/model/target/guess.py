@@ -23,7 +23,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.config.constants import SEARCHED_CELLS, SUMMABLE
+from relgym.config.constants import FIRST, OFTEN, SEARCHED_CELLS, SUMMABLE
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -31,9 +31,6 @@ from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Guess", "Guesses"]
-
-LEAST, GROWTH = 64, 1.5
-"""A first guess after so many examples, another one when their number has grown by this factor."""
 
 MOST_ROWS = 3_000
 """At most so many examples, evenly spread over time, choose terms: fewer where there are many features."""
@@ -97,7 +94,7 @@ class Guesses:
         self.best: Guess | None = None
         self.beyond: Guess | None = None
         self.errors = np.zeros((2, 2))
-        self._due = LEAST
+        self._due = FIRST
         self._trials: list[_Trial] | None = None  # those under way
 
     @property
@@ -141,7 +138,7 @@ class Guesses:
         if self._trials is None and not budget.left:
             return  # what waits holds no data
         if self._trials is None:
-            self._due = int(GROWTH * max(LEAST, clusterer.seen))
+            self._due = int(OFTEN * max(FIRST, clusterer.seen))
             numbers, slots = alike(clusterer, table)
             beyond = numbers[~scope.covers(table.x[clusterer.rows[numbers]], slots)]
             self._trials = [_Trial.of(clusterer, table, slots, some) for some in (numbers, beyond)]
@@ -168,7 +165,7 @@ class Guesses:
         found.best, found.beyond = (_read(target, data.get(name)) for name in ("best", "beyond"))
         if "errors" in data:
             found.errors = np.array(data["errors"], dtype=np.float64)
-        found._due = data.get("due", LEAST)
+        found._due = data.get("due", FIRST)
         return found
 
 
@@ -202,13 +199,13 @@ class _Trial:
     ) -> _Trial:
         """Begin with some examples; there is nothing to do if they are too few."""
         order, stages = slots.preference(clusterer.target)
-        if len(numbers) < LEAST or slots.feature_count > MOST_FEATURES:
+        if len(numbers) < FIRST or slots.feature_count > MOST_FEATURES:
             return cls(slots, order, [])
         present = np.array([slots.at(int(k)).property[-1:] != "'" for k in order])
         widths = [int(present[:stage].sum()) for stage in (stages[:2] if slots.features else stages[:1])]
         order, tasks = order[present], []
         for width in widths:  # few examples choose among many features badly
-            some = spread_out(numbers, min(MOST_ROWS, max(LEAST, SEARCHED_CELLS // width)))
+            some = spread_out(numbers, min(MOST_ROWS, max(FIRST, SEARCHED_CELLS // width)))
             tasks.append(Task(_choice, *_data(clusterer, table, slots, order[:width], some)))
         return cls(slots, order, tasks)
 

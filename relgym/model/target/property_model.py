@@ -44,9 +44,6 @@ from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
-MEASURE_EVERY = 256
-"""Spreads are measured after so many examples, and whenever the modes change."""
-
 DOUBTFUL = 500
 """With most of so many recent examples unexplained there is hardly a law."""
 
@@ -199,7 +196,7 @@ class PropertyModel:
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
-        self._unmeasured |= self.clusterer.seen % MEASURE_EVERY == 0
+        self._unmeasured |= self.clusterer.seen % HOPELESS == 0
         if report.changed or (self._unmeasured and (budget is None or budget.left)):
             self._measure(table)
             if budget is not None:  # so that not all of many targets are measured in the same step

@@ -16,9 +16,10 @@ from streams import ALONE, BALL, Stream
 
 from relgym import hypotheses
 from relgym.clustering.columns import SlotSignature
+from relgym.config.constants import FIRST
 from relgym.errors import ConfigError
 from relgym.hypotheses import Examples, Law, register_hypothesis
-from relgym.model.target.candidates import FIRST, MOST_ROWS, Candidates, _shown
+from relgym.model.target.candidates import MOST_ROWS, Candidates, _shown
 from relgym.scene.objects import TASK, ObjectType
 from relgym.scheduling.agenda import Budget
 
@@ -154,13 +155,13 @@ def test_what_is_left_unsaid_costs_a_whole_number(kind: Offsets) -> None:
 def test_they_are_asked_after_so_many_and_whenever_there_are_twice_as_many(kind: Offsets) -> None:
     found = Candidates([kind.name])
     assert not found.due(FIRST - 1) and found.due(FIRST)
-    assert asked(found, filled(40)) == ()
-    assert not found.due(79) and found.due(80)
+    assert asked(found, filled(70)) == ()
+    assert not found.due(139) and found.due(140)
     kind.proposal = off_by(0.0, 1)
-    assert asked(found, filled(80)) == (0,)
-    assert not found.due(159) and found.due(160)
-    assert asked(found, filled(160)) == ()  # the same law saves nothing
-    assert [len(each.y) for each in kind.shown] == [40, 80, 160]
+    assert asked(found, filled(140)) == (0,)
+    assert not found.due(279) and found.due(280)
+    assert asked(found, filled(280)) == ()  # the same law saves nothing
+    assert [len(each.y) for each in kind.shown] == [70, 140, 280]
 
 
 def test_nobody_is_asked_where_there_is_no_class() -> None:
@@ -244,7 +245,7 @@ def test_what_is_read_says_and_is_asked_as_what_was_saved(kind: Offsets) -> None
     assert asked(found, filled(40)) == (0,)
     again.restore(json.loads(json.dumps(found.to_json())))
     assert again.to_json() == found.to_json()
-    assert (again.laws, again.due(79), again.due(80)) == (found.laws, False, True)
+    assert (again.laws, again.due(127), again.due(128)) == (found.laws, False, True)
     x = np.arange(8.0).reshape(4, 2)
     np.testing.assert_array_equal(again.values(ALONE, x), found.values(ALONE, x))
 

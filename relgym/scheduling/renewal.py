@@ -1,0 +1,33 @@
+"""When what was fitted to examples is fitted anew: whenever there are so many times as many."""
+
+from __future__ import annotations
+
+import math
+
+__all__ = ["due"]
+
+
+def due(seen: int, first: int, times: float = 2) -> bool:
+    """Whether so many examples are the first ones, or so many times as many, or that again.
+
+    So all fits before the latest one cost no more than that does, or twice as much where there are half as many more.
+
+    Parameters
+    ----------
+    seen
+        Examples so far.
+    first
+        Examples that it is fitted to for the first time.
+    times
+        More than 1.
+
+    Examples
+    --------
+    >>> [n for n in range(1_000) if due(n, 64)]
+    [64, 128, 256, 512]
+    >>> [n for n in range(5_000) if due(n, 64, 4)]
+    [64, 256, 1024, 4096]
+    """
+    while first < seen:
+        first = math.ceil(times * first)
+    return seen == first
