@@ -16,11 +16,11 @@ from source_tree import ROOT, Module
 
 MOST = {
     "classification": (4, 3),
-    "clustering": (63, 39),
+    "clustering": (55, 39),
     "hypotheses": (0, 0),
-    "laws": (37, 24),
+    "laws": (35, 24),
     "logic": (8, 6),
-    "model": (80, 32),
+    "model": (70, 32),
     "numeric": (9, 15),
     "scheduling": (0, 0),
 }

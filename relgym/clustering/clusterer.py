@@ -19,7 +19,7 @@ from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, FIRST, HOPELESS, OFTEN, SELDOM
+from relgym.config.constants import ALIKE, FIRST, OFTEN, RECENT, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.renewal import due
@@ -198,7 +198,7 @@ class ModeClusterer:
             self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self.search.discover(table, example, budget)
-        reassigned = self.seen >= HOPELESS and due(self.seen, FIRST, OFTEN) and self._review(table)
+        reassigned = self.seen >= RECENT and due(self.seen, FIRST, OFTEN) and self._review(table)
         self.due |= self._timely(table)
         self.approximate_now(table, budget)
         after = set(self.clusters)
@@ -357,7 +357,7 @@ class ModeClusterer:
         if self._resort is None:
             if self._anew and self.search.tried:  # for laws, in vain
                 self._anew = False
-                self.due |= self.config.noise_std == "auto" and self.seen >= HOPELESS
+                self.due |= self.config.noise_std == "auto" and self.seen >= RECENT
             if not self.due or not budget.left or self._anew:
                 return False  # what waits holds no data
             self.due = False

@@ -25,7 +25,15 @@ from numpy.typing import NDArray
 
 from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, CALL, ROUNDED, SAMPLES_ALIKE, SAMPLES_TRIED
+from relgym.config.constants import (
+    ALIKE,
+    CALL,
+    MOST_ROWS,
+    ROUNDED,
+    SAMPLES_ALIKE,
+    SAMPLES_TRIED,
+    SEARCHED_ROWS,
+)
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
     LinearFit,
@@ -38,7 +46,6 @@ from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "EXACT",
-    "SEARCH",
     "Scale",
     "find_mode",
     "identified",
@@ -48,9 +55,6 @@ __all__ = [
     "searched",
     "verifying_bits",
 ]
-
-SEARCH = 400
-"""At most this many rows are searched at a time, and half as many older ones."""
 
 NEAR, MOST_NEAR = 16.0, 0.5
 """Rows that miss a function by up to so many tails are near misses; so many per inlier are too many."""
@@ -66,9 +70,6 @@ WIDE = 40
 
 COUNTED = 64
 """A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
-
-RECENT = 4_096
-"""So many examples show whether a target counts something."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
 """Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
@@ -131,7 +132,7 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 
 def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
     """Whether a target's latest values are at most so many whole multiples of one step: one that fits says little."""
-    values = np.unique(y[-RECENT:])
+    values = np.unique(y[-MOST_ROWS:])
     if not 3 <= len(values) <= most:
         return False
     steps = np.diff(values)
@@ -366,11 +367,11 @@ def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
     Parameters
     ----------
     x, left
-        Rows ``(n, d)`` and residuals ``(n,)``; at most `SEARCH` of them, evenly spread, are looked at.
+        Rows ``(n, d)`` and residuals ``(n,)``; at most `SEARCHED_ROWS` of them, evenly spread, are looked at.
     """
     if len(left) < 2:
         return 0.0
-    pick = np.unique(np.linspace(0, len(left) - 1, SEARCH).astype(np.intp))
+    pick = np.unique(np.linspace(0, len(left) - 1, SEARCHED_ROWS).astype(np.intp))
     columns = varying_columns(x[pick])
     if not len(columns):
         return 0.0
@@ -403,13 +404,13 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
 
 def searched(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """The rows that are searched of so many: the newest and a random choice of older ones, ascending."""
-    if n <= SEARCH:
+    if n <= SEARCHED_ROWS:
         return np.arange(n)
     # Fresh ones may outnumber the rows: some of them have become a mode's tail in the meantime. And of very many, as
     # where nothing is ever found, the newest are enough.
-    newest = np.arange(max(n - min(max(fresh, SEARCH // 2), SEARCH), 0), n)
+    newest = np.arange(max(n - min(max(fresh, SEARCHED_ROWS // 2), SEARCHED_ROWS), 0), n)
     older = (
-        rng.choice(newest[0], size=min(int(newest[0]), SEARCH // 2), replace=False)
+        rng.choice(newest[0], size=min(int(newest[0]), SEARCHED_ROWS // 2), replace=False)
         if newest[0]
         else newest[:0]
     )
@@ -418,7 +419,7 @@ def searched(n: int, fresh: int, rng: np.random.Generator) -> NDArray[np.intp]:
 
 def law_cells(found: Consensus, own: int) -> int:
     """What `is_law` costs, in cells."""
-    return CALL + 2 * own * min(found.size, SEARCH) ** 2
+    return CALL + 2 * own * min(found.size, SEARCHED_ROWS) ** 2
 
 
 @resumable

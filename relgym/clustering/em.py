@@ -19,12 +19,10 @@ from relgym.clustering.discovery import Scale
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import Binding, bind
+from relgym.config.constants import MOST_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["Cluster", "preferred", "refit", "role_matrix"]
-
-MOST_REFIT = 4_000
-"""At most this many examples, evenly spread over time, determine a refit."""
 
 
 @dataclass(frozen=False, slots=True)
@@ -139,8 +137,8 @@ def refit(
     done = replace(cluster, fitted=max(1, len(rows)), unfitted=0)
     if len(rows) < 3:
         return done
-    if len(rows) > MOST_REFIT:
-        pick = np.linspace(0, len(rows) - 1, MOST_REFIT).astype(np.intp)
+    if len(rows) > MOST_ROWS:
+        pick = np.linspace(0, len(rows) - 1, MOST_ROWS).astype(np.intp)
         rows, y = rows[pick], y[pick]
     mode = cluster.mode
     _, assignment = cluster.errors(table, rows, y, scale)

@@ -19,10 +19,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, RECENT, SEARCH, counts, least_examples, verifying_bits
+from relgym.clustering.discovery import EXACT, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
-from relgym.config.constants import ROUNDED
+from relgym.config.constants import MOST_ROWS, ROUNDED, SEARCHED_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
@@ -64,7 +64,7 @@ def extended(
     Where each example verifies a function by `EXACT` bits; where by `FLAGGED`, only by flags, and never by flags where
     the target counts something. Flags may extend all
     modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
-    O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCH`, fresh at most `NEWEST`.
+    O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most `NEWEST`.
     """
     bits = verifying_bits(known.y, known.scale)
     if not len(pool) or bits < FLAGGED:
@@ -76,8 +76,10 @@ def extended(
             return LinearFit((), (), value, 0.0)
     if not known.clusters:
         return None
-    pool, exact = pool[-SEARCH:], bits >= EXACT and not flags
-    counting = counts(known.y, known.scale, RECENT)  # where whole numbers agree, they often do so by chance
+    pool, exact = pool[-SEARCHED_ROWS:], bits >= EXACT and not flags
+    counting = counts(
+        known.y, known.scale, MOST_ROWS
+    )  # where whole numbers agree, they often do so by chance
     if counting and not exact:
         return None
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
@@ -87,7 +89,7 @@ def extended(
             known,
             signature,
             i,
-            members[-SEARCH:],
+            members[-SEARCHED_ROWS:],
             pool,
             min(fresh, NEWEST),
             exact=exact,

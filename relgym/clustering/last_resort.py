@@ -34,15 +34,12 @@ from relgym.clustering.approximation import (
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
-from relgym.config.constants import FIRST, HOPELESS, OFTEN, SELDOM
+from relgym.config.constants import FIRST, MOST_ROWS, OFTEN, RECENT, SELDOM
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.renewal import due
 from relgym.scheduling.work import Task
 
 __all__ = ["LastResort", "Resort", "last_resort", "timely"]
-
-MOST_ROWS = 1500
-"""At most so many rows, the newest, determine an approximation."""
 
 BETTER = 0.95
 """An approximation gives way to one whose errors are smaller by this factor, or to a shorter one that is as good."""
@@ -62,8 +59,8 @@ def timely(population: Population, table: ExampleTable, *, again: bool) -> bool:
 
     Among features it is looked for oftener, since more examples choose better among many: unless noise is what is left.
     """
-    if population.seen < HOPELESS or due(population.seen, FIRST, SELDOM):
-        return population.seen >= HOPELESS
+    if population.seen < RECENT or due(population.seen, FIRST, SELDOM):
+        return population.seen >= RECENT
     if not due(population.seen, FIRST, OFTEN):
         return False
     signature, recent = _recent(population, table)

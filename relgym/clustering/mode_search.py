@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import (
     EXACT,
-    SEARCH,
     counts,
     find_mode,
     searched,
@@ -25,7 +24,7 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
-from relgym.config.constants import CALL, HOPELESS, SEARCHED_CELLS
+from relgym.config.constants import CALL, RECENT, SEARCHED_CELLS, SEARCHED_ROWS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.agenda import Budget
@@ -186,7 +185,7 @@ class ModeSearch:
         population = self.population
         slots = table.signatures[hunt.signature]
         order, stages = slots.preference(population.target)
-        pool = pool[-max(2 * SEARCH, SEARCHED_CELLS // max(1, len(order))) :]
+        pool = pool[-max(2 * SEARCHED_ROWS, SEARCHED_CELLS // max(1, len(order))) :]
         rows = population.rows[pool]
         part = searched(len(pool), hunt.fresh, self._rng)
         several = len(np.unique(table.strata[rows[part]])) > 1
@@ -244,7 +243,7 @@ class ModeSearch:
         Where they are cheap it may take many to find the first law of many, and none is given up.
         """
         population = self.population
-        lost = dear and population.seen >= HOPELESS and 2 * population.noise_examples > population.seen
+        lost = dear and population.seen >= RECENT and 2 * population.noise_examples > population.seen
         if population.approximate or lost:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
         return search.failures if doubtful else search.failures // 6
@@ -253,11 +252,11 @@ class ModeSearch:
         """The end of `_pool`, all that `extended` looks at: found without a look at everything that is remembered."""
         if is_flag(self.population.y):  # how many took a value counts
             return self._pool(table, signature)
-        found, end, length = np.empty(0, dtype=np.intp), len(self.population.y), 2 * SEARCH
-        while end > 0 and len(found) < SEARCH:
+        found, end, length = np.empty(0, dtype=np.intp), len(self.population.y), 2 * SEARCHED_ROWS
+        while end > 0 and len(found) < SEARCHED_ROWS:
             found = np.concatenate([self._pool(table, signature, slice(max(end - length, 0), end)), found])
             end, length = end - length, 2 * length
-        return found[-SEARCH:]
+        return found[-SEARCHED_ROWS:]
 
     def _pool(self, table: ExampleTable, signature: int, among: slice = slice(None)) -> NDArray[np.intp]:
         """Noise examples of one signature that aren't some mode's tail, oldest first; default: among all."""

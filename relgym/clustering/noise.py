@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ROUGH, ROUNDINGS
+from relgym.config.constants import RECENT, ROUGH, ROUNDINGS
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
@@ -34,9 +34,6 @@ SAME_ORDER = 100.0
 
 EXPLAINED = 0.1
 """Share of explained examples that makes noise of another order implausible."""
-
-FEW = 128
-"""Fewer examples than this can't tell noise as large as the signal from laws not seen yet."""
 
 MANY = 8
 """So many different fractions that float32 represents exactly are no coincidence."""
@@ -183,6 +180,6 @@ def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.fl
     """
     if explained > EXPLAINED and estimate > SAME_ORDER * sigma:
         return False
-    if len(y) < FEW and estimate > 0.5 * float(y.std()):
+    if len(y) < RECENT and estimate > 0.5 * float(y.std()):
         return False
     return estimate > 2.0 * sigma

@@ -15,13 +15,11 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.merging import Known
 from relgym.clustering.mode import NOISE, Mode
 from relgym.config import ClusteringConfig
+from relgym.config.constants import MOST_ROWS
 from relgym.scene.objects import Target
 
 __all__ = ["ClusterReport", "Population"]
 
-
-LATEST = 16_384
-"""So many of the latest examples tell a mode's share in a relational state, while examples come one by one."""
 
 ROUNDS = 3
 """Expectation steps of one reassignment of all examples."""
@@ -184,8 +182,8 @@ class Population:
             return NOISE
         if not self.chancy or len(fitting) == 1:
             return preferred(fitting, errors, self.clusters, self.scale)
-        labels = self.labels[-LATEST:]
-        labels = labels[table.strata[self.rows[-LATEST:]] == table.strata[self.rows[example]]]
+        labels = self.labels[-MOST_ROWS:]
+        labels = labels[table.strata[self.rows[-MOST_ROWS:]] == table.strata[self.rows[example]]]
         ids = np.array(sorted(fitting))
         error = np.array([[errors[i] for i in ids.tolist()]])
         held = np.array([np.count_nonzero(labels == i) for i in ids], dtype=float)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
-from relgym.config.constants import ROUNDED, TYPICAL
+from relgym.config.constants import MOST_ROWS, ROUNDED, TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
@@ -29,9 +29,6 @@ is usual where noise was underrated."""
 CONVINCING = 12.0
 """Evidence, in bits, that a function needs beyond what it takes to state it."""
 
-MOST = 1_000
-"""At most so many suspects are looked at, the newest."""
-
 CAPPED, CLOSE = 6.0, 3.0
 """Errors of more standard deviations count as these; examples that fit a function within these determine it."""
 
@@ -42,7 +39,7 @@ TRIALS, LEAST_DRAWS, MOST_DRAWS = 2_000, 20, 120
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:
     """Examples of relational states in which the known modes' errors are larger than the noise explains, oldest first.
 
-    They are at most `MOST`, the newest.
+    They are at most `MOST_ROWS`, the newest.
 
     Parameters
     ----------
@@ -57,7 +54,7 @@ def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Sc
     _, state, count = np.unique(strata, return_inverse=True, return_counts=True)
     usual = max(1.0, float(np.median(square)) / TYPICAL**2) if len(square) else 1.0
     badly = np.bincount(state, weights=square) >= BADLY * usual * count
-    found: NDArray[np.intp] = np.flatnonzero(badly[state])[-MOST:]
+    found: NDArray[np.intp] = np.flatnonzero(badly[state])[-MOST_ROWS:]
     return found
 
 

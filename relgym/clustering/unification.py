@@ -10,14 +10,12 @@ from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.config import ClusteringConfig
+from relgym.config.constants import FIRST
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
 from relgym.scene.objects import Target
 
 __all__ = ["covering", "reordered", "unified", "unified_family"]
-
-SIDE = 60
-"""At most this many examples of each side are regressed; the function is then checked on all."""
 
 
 def covering(
@@ -183,6 +181,6 @@ def reordered(fit: LinearFit, order: NDArray[np.intp]) -> LinearFit:
 
 
 def _spread(examples: NDArray[np.intp]) -> NDArray[np.intp]:
-    if len(examples) <= SIDE:
+    if len(examples) <= FIRST:
         return examples
-    return examples[np.linspace(0, len(examples) - 1, SIDE).astype(np.intp)]
+    return examples[np.linspace(0, len(examples) - 1, FIRST).astype(np.intp)]

@@ -15,21 +15,21 @@ __all__ = [
     "BEYOND",
     "CACHED",
     "CALL",
-    "CONTACTS_KEPT",
     "DIGITS",
     "EVIDENCE",
     "EXTRAPOLATED",
     "FIRST",
     "FIRST_ROOM",
-    "HOPELESS",
     "LARGE",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
     "MORE_ROOM",
     "MOST_BYTES",
+    "MOST_ROWS",
     "MOST_STEPS",
     "OFTEN",
     "POWERS",
+    "RECENT",
     "ROUGH",
     "ROUNDED",
     "ROUNDINGS",
@@ -38,6 +38,7 @@ __all__ = [
     "SAMPLES_TRIED",
     "SCENE_ROWS",
     "SEARCHED_CELLS",
+    "SEARCHED_ROWS",
     "SELDOM",
     "SHORT",
     "STDS",
@@ -93,8 +94,17 @@ SELDOM: Final = 4
 """What shouldn't come and go, such as the noise, is estimated anew when there are so many times as many examples: what
 is left to chance is half as much then."""
 
-HOPELESS: Final = 200
-"""Examples among which there is a law, or it is doubtful that there is one: five times what the thesis' modes need."""
+RECENT: Final = 200
+"""Latest examples that tell how things stand at present: five times what the thesis' modes need, so that there is a law
+among them, or it is doubtful that there is one. A share of them is known to 3 %."""
+
+MOST_ROWS: Final = 3_000
+"""Examples that are kept for, or looked at in, one fit at most, the newest or some spread over time: more tell weights
+and spreads to less than 2 %, 1 / sqrt(n), of what they can't explain."""
+
+SEARCHED_ROWS: Final = 400
+"""Examples among which functions are searched for at a time: there are forty of a mode that is a tenth of them, and the
+squares of their distances are as many numbers as a few caches hold. What is found is fitted to more."""
 
 LEFT_OPEN: Final = 0.02
 """Share of its examples that a law may leave unexplained: contacts that no engine settles, corners. The bits of so many
@@ -113,9 +123,6 @@ SAMPLES_TRIED: Final = 48
 SCENE_ROWS: Final = 3
 """Rows of each scene in a random sample of a few scenes: one tells what is constant in it, the others what changes. Of
 two scenes, the fewest, half of the six rows verify a function of a present value, an action and what is constant."""
-
-CONTACTS_KEPT: Final = 3_000
-"""Contacts that laws of touching pairs remember, at most: some hundred of each kind in a world of many kinds."""
 
 POWERS: Final = (1, 2, 3)
 """Powers of extents that inertia and shares may go with: length, area, volume."""

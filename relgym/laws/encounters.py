@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CONTACTS_KEPT
+from relgym.config.constants import MOST_ROWS
 from relgym.laws.book import LawBook
 from relgym.laws.columns import Sources
 from relgym.laws.frames import Bearings
@@ -67,7 +67,7 @@ class EncounterStore:
         }  # fmt: skip
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
-        self._store = Store(ends[-1], CONTACTS_KEPT, seed=seed)
+        self._store = Store(ends[-1], MOST_ROWS, seed=seed)
         self._waiting: dict[int, _Waiting] = {}
 
     def __getstate__(self) -> dict[str, Any]:

@@ -25,6 +25,8 @@ from relgym.scheduling.renewal import due
 __all__ = ["FreeLearner", "free_motion"]
 
 KEPT = 600
+"""Examples of free motion that are kept."""
+
 FEWEST = 6
 """Examples that found a free law."""
 

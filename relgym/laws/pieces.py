@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, EXTRAPOLATED, ROUNDED
+from relgym.config.constants import ALIKE, EXTRAPOLATED, ROUNDED, SEARCHED_ROWS
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
@@ -28,7 +28,7 @@ ACTING = 10.0
 FEWEST = 2
 """Contacts that tell a law at least: one that fixes a weight and one that verifies it."""
 
-SEARCH, DRAWS, MOST_PIECES = 240, 96, 4
+DRAWS, MOST_PIECES = 96, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +108,8 @@ def find_pieces(examples: AxisExamples, known: list[Piece], *, rng: np.random.Ge
 def _search(part: AxisExamples, everything: AxisExamples, *, rng: np.random.Generator) -> Piece | None:
     """The function that saves most bits on some examples, or None if none saves any."""
     sample = part
-    if len(part) > SEARCH:
-        sample = part.rows(np.sort(rng.choice(len(part), SEARCH, replace=False)))
+    if len(part) > SEARCHED_ROWS:
+        sample = part.rows(np.sort(rng.choice(len(part), SEARCHED_ROWS, replace=False)))
     best: tuple[float, Piece] | None = None
     every = list(_subsets(part))
     for base, columns in every:

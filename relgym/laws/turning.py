@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CONTACTS_KEPT, TOLD
+from relgym.config.constants import MOST_ROWS, TOLD
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import POINT, axis_names, turned
@@ -256,7 +256,7 @@ class PushStore:
             widths |= {f"shape_{side}": 4, f"x_{side}": columns}
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
-        self._store = Store(ends[-1], CONTACTS_KEPT, seed=seed)
+        self._store = Store(ends[-1], MOST_ROWS, seed=seed)
 
     def __len__(self) -> int:
         return len(self._store.rows)

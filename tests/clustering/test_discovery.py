@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relgym.clustering.discovery import (
-    SEARCH,
     WIDE,
     Scale,
     counts,
@@ -24,6 +23,7 @@ from relgym.clustering.discovery import (
     verifying_bits,
 )
 from relgym.config import ClusteringConfig
+from relgym.config.constants import SEARCHED_ROWS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
 from relgym.scheduling.work import Task
@@ -254,19 +254,19 @@ def test_so_many_rows_are_searched_the_newest_among_them(n: int, fresh: int, see
     rows = searched(n, fresh, np.random.default_rng(seed))
     assert (np.diff(rows) > 0).all()
     assert len(rows) == 0 or (rows[0] >= 0 and rows[-1] == n - 1)
-    if n <= SEARCH:
+    if n <= SEARCHED_ROWS:
         assert len(rows) == n
         return
-    newest = min(max(fresh, SEARCH // 2), SEARCH)
+    newest = min(max(fresh, SEARCHED_ROWS // 2), SEARCHED_ROWS)
     np.testing.assert_array_equal(rows[-newest:], np.arange(n - newest, n))
-    assert len(rows) == newest + min(n - newest, SEARCH // 2)
-    assert len(rows) <= SEARCH + SEARCH // 2
+    assert len(rows) == newest + min(n - newest, SEARCHED_ROWS // 2)
+    assert len(rows) <= SEARCHED_ROWS + SEARCHED_ROWS // 2
 
 
 def test_all_of_few_rows_are_searched_without_a_draw() -> None:
     rng = np.random.default_rng(3)
     before = rng.bit_generator.state
-    assert searched(SEARCH, 1, rng).tolist() == list(range(SEARCH))
+    assert searched(SEARCHED_ROWS, 1, rng).tolist() == list(range(SEARCHED_ROWS))
     assert rng.bit_generator.state == before
     older = [searched(5_000, 1, np.random.default_rng(k))[:200].tolist() for k in (3, 3, 4)]
     assert older[0] == older[1] != older[2]

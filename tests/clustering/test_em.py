@@ -10,8 +10,9 @@ from streams import ALONE, BALL, Stream, mode_of
 
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.discovery import Scale
-from relgym.clustering.em import MOST_REFIT, Cluster, preferred, refit, role_matrix
+from relgym.clustering.em import Cluster, preferred, refit, role_matrix
 from relgym.clustering.mode import Role
+from relgym.config.constants import MOST_ROWS
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Box
 
@@ -121,7 +122,7 @@ def test_columns_of_a_regression_are_read_from_the_players() -> None:
 
 
 def test_few_examples_are_not_refitted_and_of_many_some(rng: np.random.Generator) -> None:
-    x = rng.normal(size=(2 * MOST_REFIT, 2))
+    x = rng.normal(size=(2 * MOST_ROWS, 2))
     stream, rows = filled(ALONE, x)
     loose = Scale(1e-3, 4.0, 8.0)
     rough = Cluster(mode_of(("v", 0.5001)), fitted=7, unfitted=9)
@@ -131,7 +132,7 @@ def test_few_examples_are_not_refitted_and_of_many_some(rng: np.random.Generator
     assert refit(rough, stream.table, rows[:0], y[:0], loose).fitted == 1
     y[1] += 1.0  # not among those that are evenly spread
     many = refit(rough, stream.table, rows, y, loose)
-    assert many.fitted == 2 * MOST_REFIT
+    assert many.fitted == 2 * MOST_ROWS
     assert dict(many.mode.roles[0].terms) == pytest.approx({"v": 0.5}, abs=1e-12)
     assert many.mode.sigma < 1e-12
 

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 from streams import ALONE, BALL, Stream, V, mode_of
 
 from relgym.clustering.columns import SlotSignature
-from relgym.clustering.discovery import SEARCH, Scale
+from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
 from relgym.clustering.mode_search import MOST_DISCOVERIES, ModeSearch, Search
 from relgym.clustering.population import Population
 from relgym.config import ClusteringConfig
+from relgym.config.constants import SEARCHED_ROWS
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Box
 from relgym.scheduling.agenda import Budget
@@ -75,7 +76,7 @@ def test_the_newest_are_the_end_of_all(n: int, noisy: float, sort: str, persists
         whole = search._pool(table, signature)
         newest = search._newest(table, signature)
         # Of a flag it counts how many took a value: all are needed.
-        np.testing.assert_array_equal(newest, whole if sort == "flag" else whole[-SEARCH:])
+        np.testing.assert_array_equal(newest, whole if sort == "flag" else whole[-SEARCHED_ROWS:])
 
 
 # ---------------------------------------------------------------------- when

@@ -13,8 +13,9 @@ from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.clustering.population import LATEST, ClusterReport, Population
+from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
+from relgym.config.constants import MOST_ROWS
 
 PERSIST, DOUBLE, STILL = mode_of(("v", 1.0)), mode_of(("v", 2.0)), mode_of()
 MIRROR = mode_of(("v", -1.0), ("w", 1.0))
@@ -106,7 +107,7 @@ def test_where_noise_is_large_the_state_tells_too() -> None:
     assert population.choose(table, 20, {1: 0.05, 2: 0.0}) == 2  # the only one that explains it
     # Older examples than so many are not asked.
     population.log._size = 20
-    for _ in range(LATEST):
+    for _ in range(MOST_ROWS):
         population.log.append(21, 0.05)
     population.labels[:20] = 1
     last = population.log.append(20, 0.05)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from streams import Stream
 
 from relgym.clustering.discovery import Scale
-from relgym.clustering.suspects import MOST, Evidence, likeliest, suspects
+from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.config import ClusteringConfig
+from relgym.config.constants import MOST_ROWS
 from relgym.numeric.stepwise import LinearFit
 
 SIGMA = 0.1
@@ -38,9 +39,9 @@ def test_examples_where_no_mode_applies_are_suspects() -> None:
 
 
 def test_of_many_suspects_the_newest_are_looked_at() -> None:
-    strata = np.array([1] * 3_000 + [2] * 2_000)
+    strata = np.array([1] * 5_000 + [2] * 4_000)
     errors = np.where(strata == 2, 5.0 * SIGMA, 0.0)
-    assert suspects(strata, errors, SCALE).tolist() == list(range(5_000 - MOST, 5_000))
+    assert suspects(strata, errors, SCALE).tolist() == list(range(9_000 - MOST_ROWS, 9_000))
 
 
 # ---------------------------------------------------------------------- evidence

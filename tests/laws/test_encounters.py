@@ -92,7 +92,7 @@ def test_what_is_confirmed_is_kept_as_if_it_had_been_looked_at_at_once(
 ) -> None:
     """Also where there is no room for all, and where something that laws may read is not there."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(encounters, "CONTACTS_KEPT", most)
+        patch.setattr(encounters, "MOST_ROWS", most)
         at_once, later = (kept(steps, later=later, seed=seed) for later in (False, True))
         assert len(later) == len(at_once) == min(most, 3 + sum(windy for _, windy in steps))
         assert same(copy.deepcopy(later), at_once)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.config.constants import CALL, EVIDENCE, FIRST
+from relgym.config.constants import CALL, EVIDENCE, FIRST, MOST_ROWS
 from relgym.errors import ConfigError
 from relgym.hypotheses import Examples, Law, code_length, registered
 from relgym.model.target.scope import alike, spread_out
@@ -21,9 +21,6 @@ from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Candidates"]
-
-MOST_ROWS = 2_000
-"""Examples that a proposal is shown at most: the newest half one after the other, the older ones evenly spread."""
 
 
 class Candidates:

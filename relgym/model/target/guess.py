@@ -23,7 +23,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.config.constants import FIRST, OFTEN, SEARCHED_CELLS, SUMMABLE
+from relgym.config.constants import FIRST, MOST_ROWS, OFTEN, RECENT, SEARCHED_CELLS, SUMMABLE
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -31,12 +31,6 @@ from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Guess", "Guesses"]
-
-MOST_ROWS = 3_000
-"""At most so many examples, evenly spread over time, choose terms: fewer where there are many features."""
-
-FITTED = 12_000
-"""At most so many determine the weights of the terms chosen."""
 
 SIZES = (0, 1, 2, 4, 8, 16)
 """Numbers of terms tried; with none it is what changes in the mean."""
@@ -50,9 +44,6 @@ of the squares, it may be luck."""
 
 WORSE = 1.01
 """A smaller function may be worse by this factor than the best."""
-
-MEMORY = 300.0
-"""Over about so many examples errors are averaged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +105,7 @@ class Guesses:
         """Take in by how much the modes' prediction and the guess, made before the outcome was learned, were off."""
         # A guess may lead anywhere: what it is off by is to be summed with what comes later, whatever it is.
         off = np.minimum(np.nan_to_num(np.abs([modes, own]), nan=np.inf), SUMMABLE)
-        self.errors += (np.column_stack([np.square(off), np.sqrt(off)]) - self.errors) / MEMORY
+        self.errors += (np.column_stack([np.square(off), np.sqrt(off)]) - self.errors) / RECENT
 
     def stale(self, seen: int) -> bool:
         """Whether a new guess is due after so many examples, or under way."""
@@ -226,7 +217,7 @@ class _Trial:
         if best is None or not len(numbers):
             return None
         return Guess(
-            _fitted(clusterer, table, self.slots, self.order, spread_out(numbers, FITTED), best), left
+            _fitted(clusterer, table, self.slots, self.order, spread_out(numbers, MOST_ROWS), best), left
         )
 
 

@@ -17,7 +17,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import ROUNDED, STDS
+from relgym.config.constants import FIRST, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
 from relgym.model.predicting.calibration import OWN, Calibration, Key
 from relgym.model.predicting.prediction import Outcome, Prediction, ScenePrediction
@@ -27,9 +27,7 @@ if TYPE_CHECKING:
     from relgym.scene.objects import Target
 
 __all__ = [
-    "LEAST",
     "SHARE",
-    "WINDOW",
     "WRONG",
     "Confirmed",
     "Hindsight",
@@ -42,9 +40,6 @@ __all__ = [
 
 WRONG = ROUNDED
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
-
-WINDOW, LEAST = 200, 50
-"""So many of the latest steps are remembered; fewer than `LEAST` say nothing."""
 
 SHARE, RECOVERED = 0.15, 0.075
 """With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
@@ -113,7 +108,7 @@ class Hindsight:
     Parameters
     ----------
     steps
-        (predictions, wrong ones) by step, oldest first; of more than `WINDOW` the newest.
+        (predictions, wrong ones) by step, oldest first; of more than `RECENT` the newest.
     undecided
         What was the case before, where they leave it open.
 
@@ -126,15 +121,15 @@ class Hindsight:
 
     Examples
     --------
-    >>> known = Hindsight([(1, 0)] * 40)
+    >>> known = Hindsight([(1, 0)] * 50)
     >>> for _ in range(20):
     ...     known.add(1, 1)
     >>> known.wrong, known.spoken, known.undecided
-    (20, 60, True)
+    (20, 70, True)
     """
 
     def __init__(self, steps: Iterable[tuple[int, int]] = (), *, undecided: bool = False) -> None:
-        self._steps = deque((_step(int(n), int(k)) for n, k in steps), maxlen=WINDOW)
+        self._steps = deque((_step(int(n), int(k)) for n, k in steps), maxlen=RECENT)
         self.spoken = sum(n for n, _ in self._steps)
         self.wrong = sum(k for _, k in self._steps)
         self.undecided = undecided
@@ -145,7 +140,7 @@ class Hindsight:
 
     def add(self, spoken: int, wrong: int) -> None:
         """Take in one step. Cost O(1)."""
-        if len(self._steps) == WINDOW:
+        if len(self._steps) == RECENT:
             n, k = self._steps[0]
             self.spoken, self.wrong = self.spoken - n, self.wrong - k
         self._steps.append(_step(spoken, wrong))
@@ -153,14 +148,14 @@ class Hindsight:
         self._settle()
 
     def _settle(self) -> None:
-        if len(self._steps) >= LEAST:
+        if len(self._steps) >= FIRST:
             self.undecided = self.wrong > (RECOVERED if self.undecided else SHARE) * self.spoken
 
     def united(self, other: Hindsight) -> Hindsight:
         """What two models know together: the latest of both, in turns."""
         pairs = zip_longest(reversed(self._steps), reversed(other._steps))
         newest = [step for pair in pairs for step in pair if step is not None]
-        return Hindsight(newest[:WINDOW][::-1], undecided=self.undecided or other.undecided)
+        return Hindsight(newest[:RECENT][::-1], undecided=self.undecided or other.undecided)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back: [predictions, wrong ones] by step, and what they are taken for."""

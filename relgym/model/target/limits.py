@@ -21,15 +21,13 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
+from relgym.config.constants import RECENT
 from relgym.model.predicting.prediction import Prediction
 
-__all__ = ["EXPLAINED", "LATEST", "Limits", "constants", "find_limits", "furthest"]
+__all__ = ["EXPLAINED", "Limits", "constants", "find_limits", "furthest"]
 
 EXPLAINED: Final = 0.95
 """Share of a constant's examples that some other mode must take beyond it."""
-
-LATEST: Final = 200
-"""So many of a constant's examples, the latest, are looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +132,7 @@ def find_limits(clusterer: ModeClusterer, table: ExampleTable) -> Limits:
 
     Notes
     -----
-    Cost: at most `LATEST` examples of each constant under all modes and role assignments.
+    Cost: at most `RECENT` examples of each constant under all modes and role assignments.
     """
     known = [(m.intercept, m.id) for m in constants(clusterer)]
     if not known:
@@ -151,7 +149,7 @@ def find_limits(clusterer: ModeClusterer, table: ExampleTable) -> Limits:
 
 def _led_beyond(clusterer: ModeClusterer, table: ExampleTable, mode: int, value: float, side: float) -> bool:
     """Whether the other modes would have led beyond a constant nearly everywhere that it held."""
-    held = np.flatnonzero(clusterer.labels == mode)[-LATEST:]
+    held = np.flatnonzero(clusterer.labels == mode)[-RECENT:]
     reach = furthest(clusterer, table, held, side, without=mode)
     return bool((reach >= side * value - clusterer.scale.tolerance).mean() >= EXPLAINED)
 

@@ -21,7 +21,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import HOPELESS, LEFT_OPEN, SEARCHED_CELLS
+from relgym.config.constants import LEFT_OPEN, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
@@ -44,12 +44,8 @@ from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
-DOUBTFUL = 500
-"""With most of so many recent examples unexplained there is hardly a law."""
-
-
 LEFT = 0.05
-"""Where a larger share of the latest `HOPELESS` examples is unexplained, regressions may know better."""
+"""Where a larger share of the latest `RECENT` examples is unexplained, regressions may know better."""
 
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
@@ -151,8 +147,8 @@ class PropertyModel:
     def _assess(self) -> bool:
         seen = self.clusterer.seen
         if not self.clusterer.clusters:
-            return seen >= HOPELESS
-        return seen >= DOUBTFUL and _noisy(self.clusterer.labels[-DOUBTFUL:]) > 0.5
+            return seen >= RECENT
+        return seen >= RECENT and _noisy(self.clusterer.labels[-RECENT:]) > 0.5
 
     @property
     def needs(self) -> frozenset[tuple[str, str]]:
@@ -192,11 +188,11 @@ class PropertyModel:
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
-        self._unsettled = _noisy(self.clusterer.labels[-HOPELESS:]) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
-        self._unmeasured |= self.clusterer.seen % HOPELESS == 0
+        self._unmeasured |= self.clusterer.seen % RECENT == 0
         if report.changed or (self._unmeasured and (budget is None or budget.left)):
             self._measure(table)
             if budget is not None:  # so that not all of many targets are measured in the same step

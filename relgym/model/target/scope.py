@@ -21,14 +21,11 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import BEYOND
+from relgym.config.constants import BEYOND, MOST_ROWS
 from relgym.numeric.tree import DecisionTree, learn_tree
 from relgym.scene.objects import TASK, Target
 
 __all__ = ["EVERYWHERE", "LEAF", "Scope", "alike", "find_scope", "spread_out"]
-
-MOST_ROWS: Final = 4_000
-"""At most so many examples, evenly spread over time, teach the tree."""
 
 LEAF: Final = 5
 """Fewest examples on either side of a test."""

@@ -18,13 +18,10 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import TYPICAL
+from relgym.config.constants import MOST_ROWS, TYPICAL
 from relgym.model.target.spread_split import Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
-
-ROWS = 2_000
-"""At most this many examples of a mode, the newest, are measured."""
 
 FEW_ACTIONS, LEAST = 64, 8
 """More different actions than this aren't told apart; fewer examples of one say nothing of its spread."""
@@ -116,11 +113,11 @@ class Spreads:
 
 
 def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
-    """Measure all modes of a target. Cost: O(modes) evaluations of at most `ROWS` rows each."""
+    """Measure all modes of a target. Cost: O(modes) evaluations of at most `MOST_ROWS` rows each."""
     found: dict[int, Spread] = {}
     own: dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     for number, cluster in sorted(clusterer.clusters.items()):
-        members = np.flatnonzero(clusterer.labels == number)[-ROWS:]
+        members = np.flatnonzero(clusterer.labels == number)[-MOST_ROWS:]
         rows = clusterer.rows[members]
         if not len(members):
             continue
@@ -143,7 +140,7 @@ def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
 
 def _split(clusterer: ModeClusterer, table: ExampleTable, mode: int) -> Split | None:
     """A threshold of a number, the target's own or of something without a body, that tells spreads apart."""
-    members = np.flatnonzero(clusterer.labels == mode)[-ROWS:]
+    members = np.flatnonzero(clusterer.labels == mode)[-MOST_ROWS:]
     ids = table.signature_ids[clusterer.rows[members]]
     core = {
         k: [table.signatures[k].named(c) for c in range(table.signatures[k].core)] for k in set(ids.tolist())
@@ -161,7 +158,7 @@ def _left_over(
     clusterer: ModeClusterer, table: ExampleTable, modes: Sequence[int]
 ) -> dict[int, tuple[NDArray[np.float64], NDArray[np.int64]]]:
     """Errors and rows of the newest noise, by the mode that comes closest."""
-    noise = np.flatnonzero(clusterer.labels == NOISE)[-ROWS:]
+    noise = np.flatnonzero(clusterer.labels == NOISE)[-MOST_ROWS:]
     if not modes or not len(noise):
         return {}
     rows = clusterer.rows[noise]

@@ -20,8 +20,8 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode, sum_text
-from relgym.config.constants import ALIKE
-from relgym.model.target.limits import EXPLAINED, LATEST, constants, furthest
+from relgym.config.constants import ALIKE, RECENT
+from relgym.model.target.limits import EXPLAINED, constants, furthest
 
 __all__ = ["Landing", "Stop", "Stops", "find_stops"]
 
@@ -206,7 +206,7 @@ def find_stops(
 
 def _stops(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: str, step: float) -> list[Stop]:
     """A constant as stops at the least and the greatest value of a property; none if it held elsewhere too."""
-    held = np.flatnonzero(clusterer.labels == mode.id)[-LATEST:]
+    held = np.flatnonzero(clusterer.labels == mode.id)[-RECENT:]
     every = _values(table, clusterer.rows, prop + PRIME)
     if not len(held) or not np.isfinite(every).all():
         return []

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
+from relgym.config.constants import RECENT
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import Outcome
-from relgym.model.target.guess import MEMORY, Guesses, _terms
+from relgym.model.target.guess import Guesses, _terms
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Target, Transition
 
@@ -229,7 +230,7 @@ def test_a_guess_that_leads_anywhere_can_be_held_against_what_comes_later(off: f
     for own in (off, 1e-3, off):
         guesses.compare(1e-3, own)
     assert np.isfinite(guesses.errors).all() and guesses.errors[1, 0] > 1e280
-    assert guesses.errors[0, 0] == pytest.approx(1e-6 * (1.0 - (1.0 - 1.0 / MEMORY) ** 3))
+    assert guesses.errors[0, 0] == pytest.approx(1e-6 * (1.0 - (1.0 - 1.0 / RECENT) ** 3))
     assert not guesses.superior
 
 

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
+from relgym.config.constants import FIRST, RECENT
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
-from relgym.model.target.hindsight import LEAST, RECOVERED, SHARE, WINDOW, Hindsight
+from relgym.model.target.hindsight import RECOVERED, SHARE, Hindsight
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 
@@ -58,24 +59,24 @@ def hindsight(model: WorldModel, prop: str = "x") -> Hindsight:
 # ---------------------------------------------------------------------- counting
 def test_the_latest_steps_count() -> None:
     known = Hindsight([(3, 2)])
-    for _ in range(WINDOW - 1):
+    for _ in range(RECENT - 1):
         known.add(2, 0)
-    assert (len(known), known.spoken, known.wrong) == (WINDOW, 2 * WINDOW + 1, 2)
+    assert (len(known), known.spoken, known.wrong) == (RECENT, 2 * RECENT + 1, 2)
     known.add(2, 1)
-    assert (len(known), known.spoken, known.wrong) == (WINDOW, 2 * WINDOW, 1)
+    assert (len(known), known.spoken, known.wrong) == (RECENT, 2 * RECENT, 1)
 
 
 def test_undecided_is_more_than_a_share_of_enough() -> None:
     most = int(SHARE * 100)
-    assert not Hindsight([(1, 1)] * (LEAST - 1)).undecided
-    assert Hindsight([(1, 1)] * LEAST).undecided
+    assert not Hindsight([(1, 1)] * (FIRST - 1)).undecided
+    assert Hindsight([(1, 1)] * FIRST).undecided
     assert not Hindsight([(1, 1)] * most + [(1, 0)] * (100 - most)).undecided
     assert Hindsight([(1, 1)] * (most + 1) + [(1, 0)] * (99 - most)).undecided
 
 
 def test_it_ends_at_half_the_share() -> None:
     known = Hindsight([(1, 1)] * 40 + [(1, 0)] * 160)
-    back = int(RECOVERED * WINDOW)
+    back = int(RECOVERED * RECENT)
     for _ in range(40 - back - 1):
         known.add(1, 0)
     assert (known.wrong, known.undecided) == (back + 1, True)
@@ -94,7 +95,7 @@ def test_counts_are_those_of_the_steps_kept(
         known.add(*step)
     again = Hindsight.from_json(json.loads(json.dumps(known.to_json())))
     assert again.to_json() == known.to_json()
-    kept = (first + rest)[-WINDOW:]
+    kept = (first + rest)[-RECENT:]
     assert known.to_json()["steps"] == list(map(list, kept))
     assert (known.spoken, known.wrong) == (sum(n for n, _ in kept), sum(k for _, k in kept))
 
@@ -103,8 +104,8 @@ def test_two_models_latest_steps_are_taken_in_turns() -> None:
     one, other = Hindsight([(1, 0), (2, 0), (3, 0)]), Hindsight([(5, 5)])
     assert one.united(other).to_json()["steps"] == [[1, 0], [2, 0], [5, 5], [3, 0]]
     assert Hindsight().united(other).to_json() == other.to_json()
-    both = Hindsight([(1, 0)] * WINDOW).united(Hindsight([(1, 1)] * WINDOW))
-    assert (len(both), both.wrong, both.undecided) == (WINDOW, WINDOW // 2, True)
+    both = Hindsight([(1, 0)] * RECENT).united(Hindsight([(1, 1)] * RECENT))
+    assert (len(both), both.wrong, both.undecided) == (RECENT, RECENT // 2, True)
 
 
 # ---------------------------------------------------------------------- what follows
@@ -173,7 +174,7 @@ def test_right_predictions_make_up_for_wrong_ones(lottery: WorldModel) -> None:
     model = copy.deepcopy(lottery)
     law = pushes(1, seed=3)[0]
     said = model.predict_one(law.before)
-    for _ in range(WINDOW):
+    for _ in range(RECENT):
         model.look_back(said, {("self", "x"): 0.0})
     assert not model.property_model("self", "x").unexplained
     assert model.predict_one(law.before)["self", "x"].outcome is Outcome.PREDICTED
@@ -183,7 +184,7 @@ def test_right_predictions_make_up_for_wrong_ones(lottery: WorldModel) -> None:
 def test_with_one_mode_there_is_no_choice() -> None:
     model = learned(SCHEMA, pushes(60))
     said = model.predict_one(pushes(1)[0].before)
-    for _ in range(WINDOW):
+    for _ in range(RECENT):
         model.look_back(said, {("self", "x"): 1.0})
     assert hindsight(model).undecided
     assert not model.property_model("self", "x").unexplained
