@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from relgym.clustering.exchange import readings
 from relgym.config import ClusteringConfig
 from relgym.config.constants import (
+    ACTING,
     ALIKE,
     CALL,
     MOST_ROWS,
@@ -33,6 +34,7 @@ from relgym.config.constants import (
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
     SEARCHED_ROWS,
+    TOLD,
 )
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
@@ -120,7 +122,7 @@ def least_examples(
     if config.min_examples != "auto":
         return int(config.min_examples)
     bits = verifying_bits(y, scale) - math.log2(choices)
-    share = min(max((EXACT - bits) / 12.0, 0.0), 1.0)
+    share = min(max(2.0 - 2.0 * bits / EXACT, 0.0), 1.0)
     return round(10 + 30 * share)
 
 
@@ -136,7 +138,7 @@ def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
     if not 3 <= len(values) <= most:
         return False
     steps = np.diff(values)
-    if not steps.min() > 100.0 * scale.tolerance:
+    if not steps.min() > TOLD * scale.tolerance:
         return False
     ratio = steps / steps.min()
     return bool(np.abs(ratio - np.round(ratio)).max() < ALIKE)
@@ -467,7 +469,7 @@ def _unsupported(
             kept[np.flatnonzero(kept)[np.argmax(stake)]] = False
         remaining = np.square(weight * _own_part(x[kept], fit, column))
         yield 2 * support * fitting_cells(len(x), len(fit.columns))
-        much = (10.0 * scale.tolerance) ** 2
+        much = (ACTING * scale.tolerance) ** 2
         # Through noise, many rows that say little each determine a weight as well as a few that say much.
         together = remaining.sum() > support * much and remaining.mean() > QUIET * scale.tolerance**2
         if remaining.max(initial=0.0) <= much and (scale.misfit or not together):
@@ -537,7 +539,7 @@ def _enough_combinations(
     weight = dict(zip(fit.columns, fit.weights, strict=True))
     part = sum(weight[c] * x[:, c] for c in slow)
     # If every combination contributes another value, each verifies them that weights and a constant don't use up.
-    verified = len(np.unique(np.round(part / (100.0 * tolerance))))
+    verified = len(np.unique(np.round(part / (TOLD * tolerance))))
     spare = verifying_combinations(len(slow), combinations, x.shape[1], float(np.ptp(y)) / tolerance)
     if combinations < 2 * len(slow) + 2 and verified < len(slow) + 1 + spare:
         return False

@@ -22,16 +22,13 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import EXACT, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
-from relgym.config.constants import MOST_ROWS, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import EVIDENCE, MOST_ROWS, ROUNDED, SEARCHED_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
 
 NEWEST: Final = 32
 """At most so many new examples are tried."""
-
-FLAGGED: Final = 20.0
-"""Flags ask for fewer bits than `EXACT`: few examples are flagged, so that few pairs could agree by chance."""
 
 APART: Final = 1e-3
 """Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
@@ -61,13 +58,13 @@ def extended(
 
     Notes
     -----
-    Where each example verifies a function by `EXACT` bits; where by `FLAGGED`, only by flags, and never by flags where
+    Where each example verifies a function by `EXACT` bits; where by twice `EVIDENCE`, only by flags, of which there are so few that few pairs could agree by chance, and never by flags where
     the target counts something. Flags may extend all
     modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
     O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most `NEWEST`.
     """
     bits = verifying_bits(known.y, known.scale)
-    if not len(pool) or bits < FLAGGED:
+    if not len(pool) or bits < 2.0 * EVIDENCE:
         return None
     if is_flag(known.y):
         value = float(known.y[pool[-1]])

@@ -32,9 +32,6 @@ from relgym.scheduling.work import Task
 
 __all__ = ["ModeSearch", "Search"]
 
-CHANCY = 0.5
-"""Where an example verifies a function by less than so much of `EXACT`, others' examples fit it by chance."""
-
 SURPRISING = 2.0
 """A new mode takes over examples that the known ones miss by so many standard deviations."""
 
@@ -271,7 +268,7 @@ class ModeSearch:
         """Where noise is large, look for modes whose examples others explain by chance, and assign all anew."""
         population = self.population
         by_chance = (
-            not population.scale.misfit and verifying_bits(population.y, population.scale) <= CHANCY * EXACT
+            not population.scale.misfit and verifying_bits(population.y, population.scale) <= 0.5 * EXACT
         )
         # In a world of one state all examples are where they are; there noise that depends on the action would give
         # its quiet actions a mode of their own, and leave the loud ones without any (LunarLander's engine).

@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import RECENT, ROUGH, ROUNDINGS
+from relgym.config.constants import RECENT, ROUGH, ROUNDINGS, TOLD
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
@@ -28,9 +28,6 @@ SELECTED = 3.0
 
 MOST_WINDOWS = 24
 """At most about this many windows are looked at."""
-
-SAME_ORDER = 100.0
-"""Noise larger than assumed by at most this factor may have hidden examples of the modes known so far."""
 
 EXPLAINED = 0.1
 """Share of explained examples that makes noise of another order implausible."""
@@ -178,7 +175,7 @@ def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.fl
     y
         All responses, shape ``(n,)``.
     """
-    if explained > EXPLAINED and estimate > SAME_ORDER * sigma:
+    if explained > EXPLAINED and estimate > TOLD * sigma:
         return False
     if len(y) < RECENT and estimate > 0.5 * float(y.std()):
         return False

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
-from relgym.config.constants import MOST_ROWS, ROUNDED, TYPICAL
+from relgym.config.constants import EVIDENCE, MOST_ROWS, ROUNDED, TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
@@ -25,9 +25,6 @@ __all__ = ["Evidence", "likeliest", "suspects"]
 BADLY = 2.0
 """Examples of a state are suspects if their errors' mean square is so many times the noise's variance, or what
 is usual where noise was underrated."""
-
-CONVINCING = 12.0
-"""Evidence, in bits, that a function needs beyond what it takes to state it."""
 
 CAPPED, CLOSE = 6.0, 3.0
 """Errors of more standard deviations count as these; examples that fit a function within these determine it."""
@@ -150,7 +147,7 @@ def likeliest(
     if best is None:
         return None
     best, bits = _refined(evidence, best, bits, most)
-    return best if bits >= CONVINCING else None
+    return best if bits >= EVIDENCE else None
 
 
 def _refined(evidence: Evidence, fit: LinearFit, bits: float, most: int) -> tuple[LinearFit, float]:

@@ -9,6 +9,7 @@ import sys
 from typing import Final
 
 __all__ = [
+    "ACTING",
     "ALIKE",
     "ALL_DIGITS",
     "ANSWERS",
@@ -27,6 +28,7 @@ __all__ = [
     "MOST_BYTES",
     "MOST_ROWS",
     "MOST_STEPS",
+    "NUMBER_BITS",
     "OFTEN",
     "POWERS",
     "RECENT",
@@ -77,7 +79,14 @@ EXTRAPOLATED: Final = 100.0
 distance from them, in units of how far they lie apart, and that is seldom more."""
 
 TOLD: Final = 100.0
-"""A change of so many tolerances tells a weight to 1 %."""
+"""A change of so many tolerances tells a weight to 1 %; numbers that differ by less tell nothing, and what is estimated
+is of the same order up to so many times as much."""
+
+ACTING: Final = 10.0
+"""A term acts on an example where it contributes more than so many tolerances, a tenth of what would tell its weight."""
+
+NUMBER_BITS: Final = 33.0
+"""Bits of a number that nothing tells: sign, and what lies between the largest and the tolerance of exact ones."""
 
 BEYOND: Final = 0.5
 """Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import DIGITS
-from relgym.laws.book import SPREAD, LawBook
+from relgym.config.constants import DIGITS, TOLD
+from relgym.laws.book import LawBook
 from relgym.laws.composition import Engaged, compose
 from relgym.laws.frames import axes_of, axis_names, turned
 from relgym.laws.impulses import solve
@@ -138,7 +138,7 @@ def _of_points(
                     for values in (one.now, others)
                 )
                 told = _axes(
-                    engaged, pair, axes, before[:, None], without[:, None], digits, SPREAD * book.tolerance,
+                    engaged, pair, axes, before[:, None], without[:, None], digits, TOLD * book.tolerance,
                     one.gain[0, count + k, count + k] / one.gain[0, k, k],
                 )  # fmt: skip
                 names = [
@@ -165,7 +165,7 @@ def _of_group(
         joint = joints.at(np.zeros(1, dtype=np.intp), k, a, b, there.normal)
         others = joint.relative(velocity) - impulse[:, :, k]
         axes = axes_of(engaged.law.frame, there, others)
-        told = _axes(engaged, pair, axes, joint.relative(now), others, digits, SPREAD * book.tolerance)
+        told = _axes(engaged, pair, axes, joint.relative(now), others, digits, TOLD * book.tolerance)
         names = [cast.layout.names[cast.layout.bodies[body]] for body in (int(a[0]), int(b[0]))]
         yield ContactAccount((names[0], names[1]), engaged.law.frame, tuple(told))
 

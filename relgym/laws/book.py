@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import TOLD
 from relgym.html import html_table
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.composition import Engaged, compose, within
@@ -26,10 +27,7 @@ from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.objects import SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["SPREAD", "LawBook", "Motion"]
-
-SPREAD = 100.0
-"""Velocities that differ by at most this many tolerances are the same: so far alternative laws agree."""
+__all__ = ["LawBook", "Motion"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +178,7 @@ class LawBook:
         sense = np.array([1.0, 1.0, cast.axes.turn])[:, None, None]
         before, free = sense * now, sense * motion.velocity
         after = free.copy()
-        slack = SPREAD * self.tolerance
+        slack = TOLD * self.tolerance
         for island in points.islands(cast.first, cast.second, moves):
             scene = island.points.scene
             ends = [side[island.points.pair] for side in (cast.first, cast.second)]
@@ -273,7 +271,7 @@ class LawBook:
         lawful = ((least >= 0) & joints.known()).all(axis=1, keepdims=True)
         governed = slice(None) if laws[0].law.frame == POINT else slice(cast.dimensions)
         stated = ~involved | (lawful & np.isfinite(after[governed]).all(axis=0))
-        slack = SPREAD * self.tolerance
+        slack = TOLD * self.tolerance
         seen = within(laws[0], group, joints, after, impulse, slack).all(axis=1, keepdims=True)
         sure = stated & (~involved | (seen & settled[:, None]))
         for alternative in laws[1:]:

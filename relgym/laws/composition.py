@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ROUNDINGS
+from relgym.config.constants import ROUNDINGS, TOLD
 from relgym.laws.frames import Bearings, axes_of, axis_names
 from relgym.laws.joints import Joint, Joints
 from relgym.laws.records import AxisLaw, PairLaw
@@ -23,9 +23,6 @@ SWEEPS = 400
 
 LEAP = 10
 """After so many sweeps each, impulses that go on changing alike are extrapolated."""
-
-FARTHEST = 100.0
-"""Most sweeps that a leap stands for."""
 
 
 class Composed(NamedTuple):
@@ -197,7 +194,7 @@ class _Settling:
         for k in range(step.shape[2]):
             kept = kept + dot(before[..., k], before[..., k])
             along = along + dot(before[..., k], step[..., k])
-        ratio = np.clip(along / np.where(kept > 0.0, kept, 1.0), 0.0, 1.0 - 1.0 / FARTHEST)
+        ratio = np.clip(along / np.where(kept > 0.0, kept, 1.0), 0.0, 1.0 - 1.0 / TOLD)
         steps = np.where(ratio > 0.5, ratio / (1.0 - ratio), 0.0)
         for k, (joint, _) in enumerate(self._parts):
             joint.apply(steps * step[..., k], self.velocity)

@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import EVIDENCE, NUMBER_BITS
 from relgym.laws.records import Piece
 
 __all__ = ["CONSTANT_BITS", "EXCEPTION_BITS", "function_bits", "piece_bits", "shorter_apart"]
 
-CONSTANT_BITS = 33.0
-"""Bits of a fitted constant, beside half a bit for every doubling of the examples that it is fitted to."""
-
-EXCEPTION_BITS = 33.0
-"""Bits of one number that no law explains."""
+CONSTANT_BITS = EXCEPTION_BITS = NUMBER_BITS
+"""Bits of a fitted constant, beside half a bit for every doubling of the examples that it is fitted to, and of one number
+that no law explains."""
 
 
 def piece_bits(piece: Piece, features: int, examples: int) -> float:

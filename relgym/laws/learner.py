@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import FIRST, LEFT_OPEN, ROUNDINGS, SELDOM, STDS, TOLD
-from relgym.laws.book import SPREAD, LawBook, Motion
+from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
 from relgym.laws.drift import Drift
@@ -342,7 +342,7 @@ class LawLearner:
         """
         if not len(touching):
             return False
-        slack = SPREAD * self.book.tolerance
+        slack = TOLD * self.book.tolerance
         with np.errstate(invalid="ignore"):
             error = np.abs(motion.velocity[:, 0] - after).max(axis=0)
             done = np.abs(after - self.book.free_motion(cast, vector[None])[1][:, 0]).max(axis=0)

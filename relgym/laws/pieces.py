@@ -14,16 +14,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, EXTRAPOLATED, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import ACTING, ALIKE, EXTRAPOLATED, ROUNDED, SEARCHED_ROWS
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
 from relgym.scene.geometry.vectors import FloatArray
 
 __all__ = ["FEWEST", "AxisExamples", "find_pieces", "fitted"]
-
-ACTING = 10.0
-"""A term acts on an example where it contributes more than this many tolerances."""
 
 FEWEST = 2
 """Contacts that tell a law at least: one that fixes a weight and one that verifies it."""

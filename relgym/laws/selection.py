@@ -19,9 +19,6 @@ __all__ = ["AxisFit", "fit_axis", "refitted"]
 MOST_COMBINED = 3
 MOST_ALTERNATIVES = 4
 
-GRIP_BITS = 16.0
-"""Bits of the claim that a body is not let go where no impulse acts: more than saying how it moves on."""
-
 
 @dataclass(frozen=True, slots=True)
 class AxisFit:
@@ -88,7 +85,7 @@ def _score(examples: AxisExamples, pieces: list[Piece], explained: NDArray[np.bo
     """Bits of a law and of the examples that it leaves unexplained."""
     bits = function_bits(pieces, len(examples.names), len(examples))
     if not any(piece.releases(examples.free) for piece in pieces):
-        bits += GRIP_BITS
+        bits += 0.5 * EXCEPTION_BITS
     return bits + EXCEPTION_BITS * float((~explained).sum())
 
 

@@ -20,7 +20,8 @@ from relgym.classification.roles import _log_odds
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode as LearnedMode
 from relgym.clustering.roles import Binding, bind
-from relgym.laws.book import SPREAD, LawBook
+from relgym.config.constants import TOLD
+from relgym.laws.book import LawBook
 from relgym.laws.frames import FRAMES, POINT, axis_names
 from relgym.laws.records import ONE, AxisLaw, PairLaw, Piece
 from relgym.laws.shares import EXTENT
@@ -167,7 +168,7 @@ class _Lowering:
         engaged = book._engaged_pairs(cast)
         pairs = tuple(self._pair(book, cast, k) for k in range(len(cast.first)))
         in_force = tuple(self._law(e.law, e.chosen) for e in engaged)
-        return ir.Motion(movers, pairs, in_force, SPREAD * book.tolerance, len(cast.velocities) > 2)
+        return ir.Motion(movers, pairs, in_force, TOLD * book.tolerance, len(cast.velocities) > 2)
 
     def _mover(self, book: LawBook, cast: Cast, body: int) -> ir.Mover:
         sources, places = cast.sources[body]

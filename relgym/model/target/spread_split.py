@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
+from relgym.config.constants import EVIDENCE
 
 __all__ = ["Split", "find_split", "place_of"]
 
 SIDE, FACTOR = 30, 3.0
 """Examples on either side that tell its spread, and how many times as large one must be as the other."""
-
-BITS = 20.0
-"""A split must make the examples likelier by so many bits more than it takes to say which it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ def find_split(
     gain[(values[1:] <= values[:-1]) | (count < SIDE) | (n - count < SIDE) | ~apart] = -np.inf
     at, column = map(int, np.unravel_index(int(gain.argmax()), gain.shape))
     cost = float(np.log2(n * d))
-    if gain[at, column] < cost + BITS:
+    if gain[at, column] < cost + EVIDENCE:
         return None
     threshold = float(0.5 * (values[at, column] + values[at + 1, column]))
     zero = int(np.searchsorted(values[:, column], 0.0, side="right")) - 1
