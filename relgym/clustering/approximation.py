@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
-from relgym.config.constants import CALL, TYPICAL
+from relgym.config.constants import ALTERNATIVES, CALL, ROUNDS, TYPICAL
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 from relgym.scheduling.work import Steps, resumable
 
@@ -51,18 +51,12 @@ NEARLY_ALL = 0.9
 MANY_FEATURES = (200, 800)
 """Among so many columns an approximation may have twice, or three times, as many terms as a mode."""
 
-ROUNDS = 3
-"""Fits, each to what the one before was good for."""
-
 TAIL: Final = 0.05
 """Share of the changes, on either side, that the second search cuts off to begin with."""
 
 SERVED: Final = 0.7
 """Of the rows that a term serves, by more than noise, so large a share must be explained where they are few, fewer than
 may be left unexplained: else it isn't their law."""
-
-CLEANED: Final = 4
-"""Terms that aren't laws are taken out at most so many times."""
 
 EQUAL: Final = 1.1
 """A shorter function may err more by this factor."""
@@ -170,7 +164,7 @@ class _Search:
         for _ in range(ROUNDS - 1):
             fit = yield from self._fit(self.y, self._explained(fit))
         whole = fit
-        for _ in range(CLEANED):
+        for _ in range(ALTERNATIVES):
             lawless = counted & self._lawless(fit, self._explained(fit))
             if not lawless.any() or (counted & ~lawless).mean() < NEARLY_ALL:
                 break

@@ -19,7 +19,7 @@ from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, FIRST, OFTEN, RECENT, SELDOM
+from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.renewal import due
@@ -31,9 +31,6 @@ ESTIMATE = 1_500_000
 
 LESS = 0.5
 """Where most is unexplained, noise was overrated by the first few examples if more of them show so much less."""
-
-LEAST_MEMBERS = 4
-"""Examples that a mode of another model must explain here to be taken over."""
 
 
 class ModeClusterer:
@@ -407,7 +404,7 @@ class ModeClusterer:
             elif (
                 functions
                 and len(self.population.explained(table, Cluster(cluster.mode), self.population.noise()))
-                >= LEAST_MEMBERS
+                >= FEWEST
             ):
                 own = Cluster(replace(cluster.mode, id=0, target=self.target))
                 matched[i] = self.search.admit(table, self.population.known(table), own)

@@ -29,12 +29,15 @@ from relgym.config.constants import (
     ACTING,
     ALIKE,
     CALL,
+    FEW_VALUES,
+    FEWEST,
     MOST_ROWS,
     ROUNDED,
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
     SEARCHED_ROWS,
     TOLD,
+    WIDE,
 )
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
@@ -66,12 +69,6 @@ QUIET, MOST_LIKE = 0.25, 0.5
 
 EXACT = 24.0
 """Where each example verifies a function by so many bits, few of them do."""
-
-WIDE = 40
-"""Searches of more columns than this draw fewer and larger samples."""
-
-COUNTED = 64
-"""A target whose values are whole multiples of one step, and fewer than so many, counts something: cells, pixels."""
 
 SIMPLE, WORDY = (1, 1, 4), 40
 """Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
@@ -132,7 +129,7 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
     return math.log2(max(spread / scale.tolerance, 2.0))
 
 
-def counts(y: NDArray[np.float64], scale: Scale, most: int = COUNTED) -> bool:
+def counts(y: NDArray[np.float64], scale: Scale, most: int = FEW_VALUES) -> bool:
     """Whether a target's latest values are at most so many whole multiples of one step: one that fits says little."""
     values = np.unique(y[-MOST_ROWS:])
     if not 3 <= len(values) <= most:
@@ -443,7 +440,7 @@ def identified(
             tolerance=scale.tolerance,
         )
         rows = np.flatnonzero(found.inliers)
-        if len(rows) < 4:
+        if len(rows) < FEWEST:
             return None
         weak, kept = yield from _unsupported(x[rows], found.fit, scale, support)
         if weak is None:

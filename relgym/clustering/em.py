@@ -19,7 +19,7 @@ from relgym.clustering.discovery import Scale
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import Binding, bind
-from relgym.config.constants import MOST_ROWS
+from relgym.config.constants import FEWEST, MOST_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["Cluster", "preferred", "refit", "role_matrix"]
@@ -135,7 +135,7 @@ def refit(
     The old function stays where the new one would lose an example that it explains.
     """
     done = replace(cluster, fitted=max(1, len(rows)), unfitted=0)
-    if len(rows) < 3:
+    if len(rows) < FEWEST:
         return done
     if len(rows) > MOST_ROWS:
         pick = np.linspace(0, len(rows) - 1, MOST_ROWS).astype(np.intp)

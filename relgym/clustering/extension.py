@@ -58,10 +58,11 @@ def extended(
 
     Notes
     -----
-    Where each example verifies a function by `EXACT` bits; where by twice `EVIDENCE`, only by flags, of which there are so few that few pairs could agree by chance, and never by flags where
-    the target counts something. Flags may extend all
-    modes whose roles have but one object to play them, other columns only those of the target's own properties. Cost
-    O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most `NEWEST`.
+    Where each example verifies a function by `EXACT` bits; where by twice `EVIDENCE`, only by flags: few examples are
+    flagged, so that few pairs could agree by chance. Never by flags where the target counts something. Flags may extend
+    all modes whose roles have but one object to play them, other columns only those of the target's own properties.
+    Cost O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most
+    `NEWEST`.
     """
     bits = verifying_bits(known.y, known.scale)
     if not len(pool) or bits < 2.0 * EVIDENCE:

@@ -14,13 +14,11 @@ from relgym.clustering.mode import Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import covering, unified, unified_family
 from relgym.config import ClusteringConfig
+from relgym.config.constants import FEWEST
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import Target
 
-__all__ = ["FAMILY", "Known", "generalise"]
-
-FAMILY = 4
-"""Modes that differ in their constant only are unified all at once when there are at least so many."""
+__all__ = ["Known", "generalise"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +119,7 @@ def _with_family(known: Known, state: _Widened, rng: np.random.Generator) -> _Wi
         for i, c in sorted(known.clusters.items())
         if i not in state.absorbed and c.mode.intercept != 0.0 and c.mode.same_function(mode, constant=False)
     ]
-    if mode.intercept == 0.0 or any(r.terms for r in mode.open_roles) or len(siblings) < FAMILY:
+    if mode.intercept == 0.0 or any(r.terms for r in mode.open_roles) or len(siblings) < FEWEST:
         return None
     families = [known.members(i) for i in siblings]
     found = unified_family(

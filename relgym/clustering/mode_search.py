@@ -24,7 +24,7 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
-from relgym.config.constants import CALL, RECENT, SEARCHED_CELLS, SEARCHED_ROWS
+from relgym.config.constants import ALTERNATIVES, CALL, RECENT, SEARCHED_CELLS, SEARCHED_ROWS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.agenda import Budget
@@ -34,9 +34,6 @@ __all__ = ["ModeSearch", "Search"]
 
 SURPRISING = 2.0
 """A new mode takes over examples that the known ones miss by so many standard deviations."""
-
-MOST_DISCOVERIES = 4
-"""New modes per example at most; what is left in the noise waits for the next one."""
 
 
 @dataclass(slots=True)
@@ -77,7 +74,7 @@ class Hunt:
 
     signature: int
     fresh: int
-    left: int = MOST_DISCOVERIES
+    left: int = ALTERNATIVES
     task: Task[Consensus | None] | None = None
     order: NDArray[np.intp] | None = None
     late: bool = False
@@ -279,7 +276,7 @@ class ModeSearch:
         ids = table.signature_ids[population.rows]
         for signature in np.unique(ids).tolist():
             there = np.flatnonzero(ids == signature)
-            for _ in range(MOST_DISCOVERIES):
+            for _ in range(ALTERNATIVES):
                 found = self._among_suspects(table, signature, there)
                 if found is None or not self._take_over(table, signature, *found):
                     break

@@ -12,15 +12,12 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import RECENT, ROUGH, ROUNDINGS, TOLD
+from relgym.config.constants import ENOUGH, RECENT, ROUGH, ROUNDINGS, TOLD
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
 
-WINDOW = 16
-"""Examples in a window."""
-
-TERMS = WINDOW // 3
+TERMS = ENOUGH // 3
 """Most weights of a local function."""
 
 SELECTED = 3.0
@@ -31,9 +28,6 @@ MOST_WINDOWS = 24
 
 EXPLAINED = 0.1
 """Share of explained examples that makes noise of another order implausible."""
-
-MANY = 8
-"""So many different fractions that float32 represents exactly are no coincidence."""
 
 SINGLES = 2.0
 """The same for numbers that were rounded to single precision when they were observed."""
@@ -72,8 +66,8 @@ def _rounded(rows: NDArray[np.float64]) -> bool:
     exact = rows[:, _single(rows).all(axis=0)]
     fractions = exact != np.round(exact)
     # Counted before they are told apart: of wide spaces most columns have none.
-    enough = np.flatnonzero(fractions.sum(axis=0) >= MANY)
-    return any(len(np.unique(exact[fractions[:, k], k])) >= MANY for k in enough)
+    enough = np.flatnonzero(fractions.sum(axis=0) >= ENOUGH)
+    return any(len(np.unique(exact[fractions[:, k], k])) >= ENOUGH for k in enough)
 
 
 def _single(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -89,7 +83,7 @@ def estimate_noise(
     strata: NDArray[np.integer],
     *,
     floor: float,
-    own: int = WINDOW,
+    own: int = ENOUGH,
 ) -> float | None:
     """Noise of y about a locally linear function: lower quartile over windows of like examples.
 
@@ -131,8 +125,8 @@ def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
     found = []
     for stratum in np.unique(strata):
         members = np.flatnonzero(strata == stratum)
-        ends = range(WINDOW, len(members) + 1, WINDOW)
-        found += [members[end - WINDOW : end] for end in ends]
+        ends = range(ENOUGH, len(members) + 1, ENOUGH)
+        found += [members[end - ENOUGH : end] for end in ends]
     found.sort(key=lambda window: int(window[0]))
     return found[:: len(found) // MOST_WINDOWS + 1]
 

@@ -15,14 +15,10 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.merging import Known
 from relgym.clustering.mode import NOISE, Mode
 from relgym.config import ClusteringConfig
-from relgym.config.constants import MOST_ROWS
+from relgym.config.constants import MOST_ROWS, ROUNDS
 from relgym.scene.objects import Target
 
 __all__ = ["ClusterReport", "Population"]
-
-
-ROUNDS = 3
-"""Expectation steps of one reassignment of all examples."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,13 +12,18 @@ __all__ = [
     "ACTING",
     "ALIKE",
     "ALL_DIGITS",
+    "ALTERNATIVES",
     "ANSWERS",
     "BEYOND",
     "CACHED",
     "CALL",
     "DIGITS",
+    "DRAWS",
+    "ENOUGH",
     "EVIDENCE",
     "EXTRAPOLATED",
+    "FEWEST",
+    "FEW_VALUES",
     "FIRST",
     "FIRST_ROOM",
     "LARGE",
@@ -35,6 +40,7 @@ __all__ = [
     "ROUGH",
     "ROUNDED",
     "ROUNDINGS",
+    "ROUNDS",
     "SAME_DIGITS",
     "SAMPLES_ALIKE",
     "SAMPLES_TRIED",
@@ -47,6 +53,7 @@ __all__ = [
     "SUMMABLE",
     "TOLD",
     "TYPICAL",
+    "WIDE",
 ]
 
 EVIDENCE: Final = 10.0
@@ -83,10 +90,10 @@ TOLD: Final = 100.0
 is of the same order up to so many times as much."""
 
 ACTING: Final = 10.0
-"""A term acts on an example where it contributes more than so many tolerances, a tenth of what would tell its weight."""
+"""A term acts on an example where it contributes more than so many tolerances: a tenth of what tells its weight."""
 
 NUMBER_BITS: Final = 33.0
-"""Bits of a number that nothing tells: sign, and what lies between the largest and the tolerance of exact ones."""
+"""Bits of a number that nothing tells: its sign, and which of 2^32 tolerances it has."""
 
 BEYOND: Final = 0.5
 """Changes may go beyond those that were seen by so much of their range: on other days somebody flies faster."""
@@ -114,6 +121,29 @@ and spreads to less than 2 %, 1 / sqrt(n), of what they can't explain."""
 SEARCHED_ROWS: Final = 400
 """Examples among which functions are searched for at a time: there are forty of a mode that is a tenth of them, and the
 squares of their distances are as many numbers as a few caches hold. What is found is fitted to more."""
+
+FEWEST: Final = 4
+"""Examples that found something where nothing says how sure each makes it: two that fix two weights, as most functions
+have, and two that verify them."""
+
+ENOUGH: Final = 16
+"""Examples that tell roughly how large something is: a standard deviation to 18 %, 1 / sqrt(2 n)."""
+
+FEW_VALUES: Final = 64
+"""Numbers that take no more values are a choice among a few, or count something: pixels, cells, actions."""
+
+ALTERNATIVES: Final = 4
+"""Alternatives of a kind that are followed up where all would be too many, the best first: of twice as many,
+mostly none of the others is chosen in the end."""
+
+ROUNDS: Final = 3
+"""Rounds of fitting to what the last fit explains: after so many the examples hardly change any more."""
+
+DRAWS: Final = 96
+"""Random samples of two rows: of what holds for a fifth of the rows, all but one in fifty searches draws a sample."""
+
+WIDE: Final = 40
+"""Searches of more columns than this draw fewer and larger samples, and choose in a cheaper way."""
 
 LEFT_OPEN: Final = 0.02
 """Share of its examples that a law may leave unexplained: contacts that no engine settles, corners. The bits of so many
@@ -173,7 +203,8 @@ LARGE: Final = 1 << 14
 """Bytes of an array from which on it is copied beside what is serialised, no longer with it."""
 
 MORE_ROOM: Final = 0.125
-"""Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all."""
+"""Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all. A
+regression is solved anew when there are so many rows more: it lags by as few, and a solution costs as much as they."""
 
 MOST_STEPS: Final = 10**9
 """Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

@@ -11,7 +11,7 @@ from relgym.laws.records import Piece
 __all__ = ["CONSTANT_BITS", "EXCEPTION_BITS", "function_bits", "piece_bits", "shorter_apart"]
 
 CONSTANT_BITS = EXCEPTION_BITS = NUMBER_BITS
-"""Bits of a fitted constant, beside half a bit for every doubling of the examples that it is fitted to, and of one number
+"""Bits of a fitted constant, beside half a bit for every doubling of the examples that it is fitted to, and of a number
 that no law explains."""
 
 

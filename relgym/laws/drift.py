@@ -13,13 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ENOUGH
+
 __all__ = ["Drift"]
 
 INDEPENDENT = 1.0
 """Least ratio of the variances of e and d at which changes count as noise: halfway from equal to independent ones."""
-
-FEWEST = 16
-"""Pairs of consecutive changes below which nothing is known."""
 
 
 @dataclass(slots=True)
@@ -57,7 +56,7 @@ class Drift:
 
     def noisy(self) -> bool:
         """Whether changes are as little alike as noise is, as far as that is known."""
-        if self.pairs < FEWEST:
+        if self.pairs < ENOUGH:
             return True
         variance = self.squares / self.count - sum([(t / self.count) * (t / self.count) for t in self.total])
         return self.steps / self.pairs >= INDEPENDENT * variance

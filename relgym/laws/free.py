@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import LEFT_OPEN, ROUNDED, ROUNDINGS, TYPICAL
+from relgym.config.constants import FEWEST, LEFT_OPEN, ROUNDED, ROUNDINGS, TYPICAL
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
@@ -26,9 +26,6 @@ __all__ = ["FreeLearner", "free_motion"]
 
 KEPT = 600
 """Examples of free motion that are kept."""
-
-FEWEST = 6
-"""Examples that found a free law."""
 
 EXPLAINS = 0.9
 """A free law that explains a smaller share of the examples is none."""

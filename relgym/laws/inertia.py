@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, DIGITS, LEFT_OPEN, POWERS, SAME_DIGITS, TOLD
+from relgym.config.constants import ALIKE, DIGITS, DRAWS, FEWEST, LEFT_OPEN, POWERS, SAME_DIGITS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -42,13 +42,8 @@ AREA: Final = "shape.area"
 SQUARE: Final = "shape.r2"
 """Name of the mean square distance of a body's points from its position."""
 
-FEWEST = 4
-"""Contacts that found a statement about inertia."""
-
 ROUGHLY = 1e-4
 """Relative error up to which contacts count as obeying a first estimate: then all of them together sharpen it."""
-
-DRAWS = 64
 
 By = Literal["", "type", "object"]
 

@@ -14,7 +14,16 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ACTING, ALIKE, EXTRAPOLATED, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import (
+    ACTING,
+    ALIKE,
+    ALTERNATIVES,
+    DRAWS,
+    EXTRAPOLATED,
+    ROUNDED,
+    ROUNDS,
+    SEARCHED_ROWS,
+)
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
@@ -24,8 +33,6 @@ __all__ = ["FEWEST", "AxisExamples", "find_pieces", "fitted"]
 
 FEWEST = 2
 """Contacts that tell a law at least: one that fixes a weight and one that verifies it."""
-
-DRAWS, MOST_PIECES = 96, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +97,7 @@ def find_pieces(examples: AxisExamples, known: list[Piece], *, rng: np.random.Ge
     left = np.ones(len(examples), dtype=bool)
     for piece in known:
         left &= ~examples.explains(piece)
-    for _ in range(MOST_PIECES):
+    for _ in range(ALTERNATIVES):
         if left.sum() < FEWEST:
             break
         told = _search(examples.rows(left), examples, rng=rng)
@@ -219,7 +226,7 @@ def _refined(
     piece: Piece, loose: NDArray[np.bool_], base: bool, examples: AxisExamples, spare: int
 ) -> Piece | None:
     """The piece fitted to what it explains, `loose` at first, as far as that determines it."""
-    for _ in range(3):
+    for _ in range(ROUNDS):
         if loose.sum() < len(piece.terms) + 1:
             return None
         refitted = fitted(piece, examples.rows(loose))

@@ -13,12 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import ALTERNATIVES
 from relgym.laws.records import Bound, Piece, Region
 from relgym.numeric.tree import DecisionTree, learn_tree
 
 __all__ = ["find_laws", "find_regions"]
-
-MOST_LAWS = 4
 
 PARTS = (2, 4, 8)
 """Numbers of stretches into which examples are cut along an axis. Narrower regions are found once others are explained:
@@ -53,7 +52,7 @@ def find_laws(
     """
     laws: list[tuple[Piece, ...]] = []
     left = np.ones(len(place), dtype=bool)
-    while len(laws) < MOST_LAWS and left.sum() >= fewest:
+    while len(laws) < ALTERNATIVES and left.sum() >= fewest:
         found = _most_telling(fit, obeys, place, left, fewest)
         if found is None:
             break

@@ -9,7 +9,7 @@ from itertools import combinations, islice
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, SAME_DIGITS
+from relgym.config.constants import ALIKE, ALTERNATIVES, SAME_DIGITS
 from relgym.laws.description import EXCEPTION_BITS, function_bits
 from relgym.laws.pieces import AxisExamples, find_pieces, fitted
 from relgym.laws.records import ZERO, Operator, Piece, combined
@@ -17,7 +17,6 @@ from relgym.laws.records import ZERO, Operator, Piece, combined
 __all__ = ["AxisFit", "fit_axis", "refitted"]
 
 MOST_COMBINED = 3
-MOST_ALTERNATIVES = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ def fit_axis(examples: AxisExamples, *, rng: np.random.Generator) -> AxisFit:
     return AxisFit(
         first.pieces,
         first.operator,
-        tuple((f.operator, f.pieces) for f in islice(alternatives, MOST_ALTERNATIVES)),
+        tuple((f.operator, f.pieces) for f in islice(alternatives, ALTERNATIVES)),
         first.explained,
         first.bits,
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import POWERS, ROUNDED, TOLD
+from relgym.config.constants import FEWEST, POWERS, ROUNDED, TOLD
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -15,9 +15,6 @@ __all__ = ["EXTENT", "find_share", "share_values"]
 
 EXTENT = "extent"
 """Name of a body's size in shares."""
-
-FEWEST = 3
-"""Contacts in which something passed between the bodies that found a share."""
 
 
 def share_values(share: Share, a: Mapping[str, FloatArray], b: Mapping[str, FloatArray]) -> FloatArray:

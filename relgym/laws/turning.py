@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import MOST_ROWS, TOLD
+from relgym.config.constants import FEWEST, MOST_ROWS, TOLD
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.frames import POINT, axis_names, turned
 from relgym.laws.free import free_motion
 from relgym.laws.impulses import Rows, Solved, table_of
-from relgym.laws.inertia import AREA, FEWEST, SQUARE, Inertia, Pushes, find_gyrations, find_mass, ratios
+from relgym.laws.inertia import AREA, SQUARE, Inertia, Pushes, find_gyrations, find_mass, ratios
 from relgym.laws.kinds import fit_apart, fit_together
 from relgym.laws.pair import PairFit
 from relgym.laws.pieces import AxisExamples

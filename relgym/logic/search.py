@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import CALL, ROUNDED, SAME_DIGITS
+from relgym.config.constants import ALTERNATIVES, CALL, ROUNDED, SAME_DIGITS
 from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
@@ -94,7 +94,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
 def _new(children: Iterator[Growing], wanted: int, pool: dict[bytes, Growing]) -> list[Growing]:
     """Take the first `wanted` clauses with other bindings than those in the pool, and add them to it."""
     taken: list[Growing] = []
-    for child in itertools.islice(children, 4 * wanted):
+    for child in itertools.islice(children, ALTERNATIVES * wanted):
         if len(taken) == wanted:
             break
         key = child.bindings.tobytes()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relgym.arguments import refusing_fields
+from relgym.config.constants import ALTERNATIVES
 from relgym.errors import ConfigError
 
 __all__ = ["FoilConfig"]
@@ -57,8 +58,8 @@ class FoilConfig:
     max_literals: int = 5
     max_clauses: int = 8
     max_new_variables: int = 2
-    beam: int = 4
-    lookahead: int = 4
+    beam: int = ALTERNATIVES
+    lookahead: int = ALTERNATIVES
     numeric: bool = True
     min_precision: float = 0.5
     mdl: bool = True

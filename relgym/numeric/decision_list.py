@@ -16,15 +16,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ROUNDED
+from relgym.config.constants import ALTERNATIVES, ROUNDED
 
 __all__ = ["Rule", "decision_list"]
 
 BEAM: Final = 12
 """So many conjunctions are grown at once."""
-
-DEFAULTS: Final = 4
-"""So many labels, the commonest, are tried as the default."""
 
 TRIED, MOST_TRIES = 2, 800
 """So many lists, the shortest, are improved, with so many changes at most."""
@@ -99,7 +96,7 @@ def decision_list(
         budget * float(heavy.sum()),
     )
     drafts = []
-    usual = np.argsort(-(labels * heavy[:, None]).sum(axis=0), kind="stable")[:DEFAULTS]
+    usual = np.argsort(-(labels * heavy[:, None]).sum(axis=0), kind="stable")[:ALTERNATIVES]
     for default in [k for k in usual.tolist() if labels[:, k].any()]:
         for by_weight in (True, False):
             rules = table.pruned(

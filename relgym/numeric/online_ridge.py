@@ -8,17 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, CACHED, SUMMABLE
+from relgym.config.constants import ALIKE, CACHED, MORE_ROOM, SUMMABLE
 
 __all__ = ["OnlineRidge", "in_order"]
 
 PENALTY = 1.0
 """Of standardised columns: each weight is taken to be no larger than the noise a single row leaves, as scikit-learn's
 default has it. It keeps weights finite where columns depend on one another."""
-
-GROWTH = 1.1
-"""Weights are solved anew when the rows have become more by this factor: they lag by at most a tenth of the rows, and
-the solutions' cost, O(d^3) each, is that of a few rows' products, O(d^2) each."""
 
 
 class OnlineRidge:
@@ -44,7 +40,7 @@ class OnlineRidge:
 
     Notes
     -----
-    Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every tenth more.
+    Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every eighth more.
 
     References
     ----------
@@ -101,7 +97,7 @@ class OnlineRidge:
         if self._solved == self.rows:
             return
         self._solved = self.rows
-        self._due = max(self.rows + 1, int(GROWTH * self.rows))
+        self._due = max(self.rows + 1, int((1.0 + MORE_ROOM) * self.rows))
         n = float(self.rows)
         if not n:
             return

@@ -28,9 +28,9 @@ from relgym.config.constants import (
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
     STDS,
+    WIDE,
 )
 from relgym.numeric.stepwise import (
-    MANY,
     LinearFit,
     eliminate_backward,
     equal_gains,
@@ -210,7 +210,7 @@ def _forward_batch(
     """Columns chosen for each sample, ``(draws, terms)``: -1 where none, -2 in front if not verified."""
     draws, size = samples.shape
     enough = size * (loose * sigma) ** 2
-    choose = _choose_among_many if x.shape[1] > MANY else choose_columns
+    choose = _choose_among_many if x.shape[1] > WIDE else choose_columns
     every = np.empty((draws, max(terms, 1)), dtype=np.intp)
     for part in _pieces(draws, CACHED, size * x.shape[1]):
         a, b = x[samples[part].T], y[samples[part]]

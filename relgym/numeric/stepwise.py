@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, CALL, ROUNDED
+from relgym.config.constants import ALIKE, CALL, ROUNDED, WIDE
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
@@ -34,9 +34,6 @@ __all__ = [
 ]
 
 _Size = TypeVar("_Size", float, NDArray[np.float64])
-
-MANY = 64
-"""More candidates than this, non-linear features, are chosen from in a cheaper way."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +234,7 @@ def forward_order(
     limit = max(0, n - 2 if max_terms is None else min(max_terms, n - 2))
     candidates = varying_columns(x) if n else np.empty(0, dtype=np.intp)
     a = x[:, candidates] - x[:, candidates].mean(axis=0) if len(candidates) else np.empty((n, 0))
-    choose = _choose_among_many if len(candidates) > MANY else _choose
+    choose = _choose_among_many if len(candidates) > WIDE else _choose
     yield CALL + x.size
     chosen = (yield from choose(a, y - y.mean(), sigma, limit)) if n else []
     return tuple(int(candidates[c]) for c in chosen)

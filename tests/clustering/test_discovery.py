@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from relgym.clustering.discovery import (
-    WIDE,
     Scale,
     counts,
     find_mode,
@@ -23,7 +22,7 @@ from relgym.clustering.discovery import (
     verifying_bits,
 )
 from relgym.config import ClusteringConfig
-from relgym.config.constants import SEARCHED_ROWS
+from relgym.config.constants import SEARCHED_ROWS, WIDE
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, least_squares
 from relgym.scheduling.work import Task

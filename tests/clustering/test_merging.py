@@ -12,9 +12,10 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.merging import FAMILY, Known, generalise
+from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import Mode, Role
 from relgym.config import ClusteringConfig
+from relgym.config.constants import FEWEST
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import ObjectType
 from relgym.scene.shapes import Box
@@ -82,7 +83,7 @@ def test_a_mode_like_no_other_absorbs_none(rng: np.random.Generator) -> None:
     assert generalise(known, new, np.arange(20, 40), rng=rng) == (new, ())
 
 
-@pytest.mark.parametrize(("others", "unified"), [(8, True), (FAMILY, True), (FAMILY - 1, False)])
+@pytest.mark.parametrize(("others", "unified"), [(8, True), (FEWEST, True), (FEWEST - 1, False)])
 def test_a_family_differs_in_its_constant_only(others: int, unified: bool, rng: np.random.Generator) -> None:
     """Friction is constant while an episode lasts: each teaches ``v' = v - c``, and many the law of c."""
     frictions = rng.uniform(0.1, 1.0, others + 1)

@@ -13,7 +13,7 @@ from relgym.clustering.discovery import Scale
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.clustering.mode_search import MOST_DISCOVERIES, ModeSearch, Search
+from relgym.clustering.mode_search import ALTERNATIVES, ModeSearch, Search
 from relgym.clustering.population import Population
 from relgym.config import ClusteringConfig
 from relgym.config.constants import SEARCHED_ROWS
@@ -188,7 +188,7 @@ def test_one_example_begins_so_many_modes_at_most(rng: np.random.Generator) -> N
     for row, value in zip(x, y.tolist(), strict=True):
         number = stream.table.add(ALONE, row, b"", [-1])
         last = stream.clusterer._append(stream.table, number, value, Budget())
-    for many in (MOST_DISCOVERIES, 6):
+    for many in (ALTERNATIVES, 6):
         stream.clusterer.search.discover(stream.table, last, Budget())
         assert len(stream.clusterer.modes) == many
         assert stream.clusterer.noise_examples == 20 * (6 - many)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.clustering.noise import MANY, WINDOW, _quartile, _windows, estimate_noise, refuted, rounding_noise
+from relgym.clustering.noise import _quartile, _windows, estimate_noise, refuted, rounding_noise
+from relgym.config.constants import ENOUGH
 
 EPS = float(np.finfo(np.float64).eps)
 EPS32 = float(np.finfo(np.float32).eps)
@@ -26,13 +27,13 @@ def test_what_single_precision_cannot_hold_was_not_rounded_to_it() -> None:
     """Nor does asking overflow."""
     for size in (1e39, 1e75):
         assert rounding_noise(np.ones((2, 1)), np.array([0.5, size])) == pytest.approx(32 * EPS * size)
-        own = np.array([[0.5 + 0.25 * k] for k in range(MANY)] + [[size]])
+        own = np.array([[0.5 + 0.25 * k] for k in range(ENOUGH)] + [[size]])
         assert rounding_noise(np.ones((2, 1)), np.array([0.1, 0.3]), own) == pytest.approx(32 * EPS)
 
 
 def test_a_column_that_was_rounded_tells_of_responses_worked_out_from_it() -> None:
     y = np.array([0.1, 0.2])  # an angle, say, of a sine and a cosine in single precision
-    fractions = np.array([[0.125 * k + 0.0625] for k in range(MANY)])
+    fractions = np.array([[0.125 * k + 0.0625] for k in range(ENOUGH)])
     for rows, coarse in ((fractions, True), (fractions[1:], False), (np.arange(20.0)[:, None], False)):
         expected = 2.0 * EPS32 if coarse else 32.0 * EPS * 5.0
         assert rounding_noise(np.full((1, 1), 5.0), y, rows) == pytest.approx(expected)
@@ -76,14 +77,14 @@ def test_too_few_examples_give_no_estimate(rng: np.random.Generator) -> None:
 
 
 def test_windows_hold_examples_of_one_state() -> None:
-    strata = np.arange(2 * WINDOW + 5) % 2
-    first, second = _windows(np.concatenate([strata, np.full(WINDOW - 1, 7)]))
-    assert first.tolist() == list(range(0, 2 * WINDOW, 2))
+    strata = np.arange(2 * ENOUGH + 5) % 2
+    first, second = _windows(np.concatenate([strata, np.full(ENOUGH - 1, 7)]))
+    assert first.tolist() == list(range(0, 2 * ENOUGH, 2))
     assert second.tolist() == list(
-        range(1, 2 * WINDOW, 2)
+        range(1, 2 * ENOUGH, 2)
     )  # of the rest, and of the third state, too few are left
-    many = _windows(np.zeros(100 * WINDOW, dtype=int))
-    assert len(many) == 20 and [w[0] for w in many[:2]] == [0, 5 * WINDOW]  # every fifth
+    many = _windows(np.zeros(100 * ENOUGH, dtype=int))
+    assert len(many) == 20 and [w[0] for w in many[:2]] == [0, 5 * ENOUGH]  # every fifth
 
 
 def test_the_lower_quartile_of_spreads_is_that_of_estimates(rng: np.random.Generator) -> None:

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from relgym.laws.drift import FEWEST, Drift
+from relgym.config.constants import ENOUGH
+from relgym.laws.drift import Drift
 
 
 def fed(changes: list[float], name: str = "a") -> Drift:
@@ -47,7 +48,7 @@ def test_a_velocity_that_is_changed_later_is_not_what_was_remembered() -> None:
 
 
 def test_so_few_pairs_tell_nothing() -> None:
-    steady = [1.0 + 0.1 * k for k in range(FEWEST + 1)]
+    steady = [1.0 + 0.1 * k for k in range(ENOUGH + 1)]
     assert fed(steady[:-1]).noisy()
     assert not fed(steady).noisy()
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import SUMMABLE
+from relgym.config.constants import ENOUGH, FIRST, SUMMABLE
 from relgym.model.percepts.scenes import MOST_LAYOUTS
 from relgym.scene.objects import SceneLayout
 
@@ -27,7 +27,7 @@ __all__ = ["Screen"]
 FACTOR = 32.0
 """A number this much larger than what is known of its property is suspicious."""
 
-START, GENEROUS = 16, 1e6
+GENEROUS = 1e6
 """In its first scenes little is known of a property: only what is this much larger than all that is known, and than 1,
 is suspicious."""
 
@@ -35,14 +35,12 @@ SUPPORT = 5
 """So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
 one step and before the next one, don't widen the limit."""
 
-LATEST, ALIKE, NEAR = 64, 16, 4.0
-"""Of so many suspicious numbers of a property so many within this factor of one another are no errors."""
-
-REPEATED = 5
-"""... nor are so many that are exactly equal: rewards, codes."""
+NEAR = 4.0
+"""Of `FIRST` suspicious numbers of a property `ENOUGH` within this factor of one another are no errors; nor are
+`SUPPORT` that are exactly equal: rewards, codes."""
 
 RUN = 8
-"""... nor so many in successive transitions: another scale."""
+"""Nor are so many in successive transitions: another scale."""
 
 MOST = math.sqrt(SUMMABLE)
 """Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
@@ -86,7 +84,7 @@ class Screen:
         self.set_aside = 0
         self._names: dict[tuple[str, str], int] = {}
         self._largest = np.zeros((0, SUPPORT))  # largest magnitudes, ascending
-        self._scenes = np.zeros(0, dtype=np.int64)  # scenes in which a property was seen, up to START
+        self._scenes = np.zeros(0, dtype=np.int64)  # scenes in which a property was seen, up to ENOUGH
         self._waiting: dict[int, list[float]] = {}  # suspicious numbers, the latest last
         self._run: dict[int, int] = {}  # successive transitions with a suspicious number
         self._limits: NDArray[np.float64] | None = None
@@ -120,7 +118,7 @@ class Screen:
                 magnitudes = np.abs(vector)
                 fine = slice(None) if within else magnitudes <= limits
                 self._note(places[fine], magnitudes[fine])
-        young = self._scenes[places] < START
+        young = self._scenes[places] < ENOUGH
         if np.count_nonzero(young):
             self._scenes[np.unique(places[young])] += 1
             self._moved()
@@ -144,7 +142,7 @@ class Screen:
         if marks is None or marks.layout is not layout:
             places = self._places(layout)
             limits, known = self._limit()[places], self._largest[places, 0]
-            young = bool((self._scenes[places] < START).any())
+            young = bool((self._scenes[places] < ENOUGH).any())
             if len(self._marks) >= MOST_LAYOUTS:
                 self._marks.clear()
             marks = self._marks[id(layout)] = _Marks(layout, places, limits, np.minimum(limits, known), young)
@@ -182,7 +180,7 @@ class Screen:
                 return np.full(len(known), GENEROUS)
             most = float(some.max())
             limits = FACTOR * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
-            limits[self._scenes < START] = GENEROUS * max(most, 1.0)
+            limits[self._scenes < ENOUGH] = GENEROUS * max(most, 1.0)
             self._limits = np.minimum(limits, MOST)
         return self._limits
 
@@ -210,10 +208,10 @@ class Screen:
         for place, value in largest.items():
             waiting = self._waiting.setdefault(place, [])
             waiting.append(value)
-            del waiting[:-LATEST]
+            del waiting[:-FIRST]
             size = abs(value)
             alike = sum(size / NEAR <= abs(other) <= size * NEAR for other in waiting)
-            if alike >= ALIKE or waiting.count(value) >= REPEATED or self._run[place] >= RUN:
+            if alike >= ENOUGH or waiting.count(value) >= SUPPORT or self._run[place] >= RUN:
                 self._largest[place] = size  # known, as if so many had come
                 self._moved()
                 del self._waiting[place], self._run[place]
@@ -225,7 +223,7 @@ class Screen:
             self._widen()
             both = np.concatenate([self._largest[place], other._largest[theirs]])
             self._largest[place] = np.sort(both)[-SUPPORT:]
-            self._scenes[place] = min(START, int(self._scenes[place] + other._scenes[theirs]))
+            self._scenes[place] = min(ENOUGH, int(self._scenes[place] + other._scenes[theirs]))
         self._moved()
         self.set_aside += other.set_aside
 

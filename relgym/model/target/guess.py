@@ -23,7 +23,7 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.config.constants import FIRST, MOST_ROWS, OFTEN, RECENT, SEARCHED_CELLS, SUMMABLE
+from relgym.config.constants import ALTERNATIVES, FIRST, MOST_ROWS, OFTEN, RECENT, SEARCHED_CELLS, SUMMABLE
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -34,9 +34,6 @@ __all__ = ["Guess", "Guesses"]
 
 SIZES = (0, 1, 2, 4, 8, 16)
 """Numbers of terms tried; with none it is what changes in the mean."""
-
-FOLDS = 4
-"""Sizes are compared on stretches of time, each predicted by what is fitted to all others."""
 
 SURE = 2.0
 """A guess must be better than that nothing changes by so many standard errors: where a handful of examples makes most
@@ -123,7 +120,7 @@ class Guesses:
     def renew(self, clusterer: ModeClusterer, table: ExampleTable, scope: Scope, budget: Budget) -> None:
         """Guess anew, beyond the scope of approximations too, as far as the budget goes.
 
-        Cost O(`FOLDS` * rows * columns * terms) with at most `SEARCHED_CELLS` for rows times columns, some
+        Cost O(`ALTERNATIVES` * rows * columns * terms) with at most `SEARCHED_CELLS` for rows times columns, some
         0.3 s among 500 features.
         """
         if self._trials is None and not budget.left:
@@ -255,9 +252,9 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[i
     The number, and what it leaves of the change; None if it is no better to say that nothing changes.
     """
     n = len(change)
-    sizes = [k for k in SIZES if k < n // FOLDS]
+    sizes = [k for k in SIZES if k < n // ALTERNATIVES]
     squares = np.empty((len(sizes), n))
-    for part in np.array_split(np.arange(n), FOLDS):
+    for part in np.array_split(np.arange(n), ALTERNATIVES):
         others = np.setdiff1d(np.arange(n), part)
         order = yield from _order(x[others], change[others], sizes[-1])
         fits = []

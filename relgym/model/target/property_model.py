@@ -21,7 +21,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import LEFT_OPEN, RECENT, SEARCHED_CELLS
+from relgym.config.constants import FEWEST, LEFT_OPEN, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
@@ -35,7 +35,7 @@ from relgym.model.target.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.target.guess import Guesses
 from relgym.model.target.hindsight import Hindsight, Standing
 from relgym.model.target.limits import Limits, find_limits
-from relgym.model.target.scope import EVERYWHERE, LEAF, Scope, find_scope
+from relgym.model.target.scope import EVERYWHERE, Scope, find_scope
 from relgym.model.target.spread import Spreads, measure
 from relgym.model.target.stops import Stops, find_stops
 from relgym.scene.objects import Target
@@ -312,7 +312,7 @@ class PropertyModel:
         self.spreads = measure(self.clusterer, table)
         # Of bodies relations may tell what the numbers of a row don't.
         bodiless = not any(t.has_body for t in self.schema.types)
-        bounded = self.fallback.lawless or (bodiless and self.clusterer.noise_examples >= LEAF)
+        bounded = self.fallback.lawless or (bodiless and self.clusterer.noise_examples >= FEWEST)
         asked = self.config.abstain and bounded and len(self.clusterer.rows)
         self.fallback.scope = (
             find_scope(self.clusterer, table, guessing=self.fallback.lawless) if asked else EVERYWHERE

@@ -21,17 +21,11 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import BEYOND, MOST_ROWS
+from relgym.config.constants import BEYOND, FEWEST, MOST_ROWS
 from relgym.numeric.tree import DecisionTree, learn_tree
 from relgym.scene.objects import TASK, Target
 
-__all__ = ["EVERYWHERE", "LEAF", "Scope", "alike", "find_scope", "spread_out"]
-
-LEAF: Final = 5
-"""Fewest examples on either side of a test."""
-
-DEPTH: Final = 4
-"""Most tests in a row."""
+__all__ = ["EVERYWHERE", "Scope", "alike", "find_scope", "spread_out"]
 
 CLOSE: Final = 0.5
 """A mode that errs by no more than so much of what changes (root mean square) is as good as a guess."""
@@ -141,7 +135,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     Notes
     -----
     The tree pays for its bits in examples explained, so what lies scattered has none. Cost
-    O(`MOST_ROWS` * columns * `DEPTH`), some 10 ms.
+    O(`MOST_ROWS` * columns * depth), some 10 ms.
     """
     numbers, slots = alike(clusterer, table)
     change = clusterer.y[numbers] - slots.present_of(table.x, clusterer.rows[numbers], clusterer.target)
@@ -155,8 +149,7 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
         table.x[clusterer.rows[some]][:, columns],
         ~_lost(clusterer, table, slots, some, guessing=guessing),
         columns=[slots.named(k) for k in columns],
-        min_leaf=LEAF,
-        max_depth=DEPTH,
+        min_leaf=FEWEST,
     )
     if len({tree.says_yes(leaf) for leaf in tree.leaves}) == 1:
         return Scope(None, *reach)

@@ -18,13 +18,10 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import MOST_ROWS, TYPICAL
-from relgym.model.target.spread_split import Split, find_split, place_of
+from relgym.config.constants import ENOUGH, FEW_VALUES, MOST_ROWS, TYPICAL
+from relgym.model.target.spread_split import FACTOR, Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
-
-FEW_ACTIONS, LEAST = 64, 8
-"""More different actions than this aren't told apart; fewer examples of one say nothing of its spread."""
 
 RECURRING = 0.5
 """At most so many different actions an example: a choice among many, and not a number that is hardly ever the same."""
@@ -56,7 +53,7 @@ class Spread:
     pooled: bool = False
     split: Split | None = None
 
-    def uneven(self, factor: float = 3.0) -> bool:
+    def uneven(self, factor: float = FACTOR) -> bool:
         """Whether some action scatters so many times as much as another one."""
         values = self.by_action.values()
         return bool(values) and max(values) > factor * min(values)
@@ -184,7 +181,7 @@ def _loud(
     found = {}
     for kind in np.unique(after, axis=0):
         own, beyond = error[(actions == kind).all(axis=1)], left[(after == kind).all(axis=1)]
-        if len(beyond) >= LEAST and len(beyond) > len(own):
+        if len(beyond) >= ENOUGH and len(beyond) > len(own):
             found[tuple(kind.tolist())] = float(np.median(np.concatenate([own, beyond]))) / TYPICAL
     return found
 
@@ -211,10 +208,10 @@ def _by_action(
     if actions is None or not actions.shape[1]:
         return {}, False
     kinds, which = np.unique(actions, axis=0, return_inverse=True)
-    if not 1 < len(kinds) <= FEW_ACTIONS:
-        return {}, FEW_ACTIONS < len(kinds) <= RECURRING * len(error)
+    if not 1 < len(kinds) <= FEW_VALUES:
+        return {}, FEW_VALUES < len(kinds) <= RECURRING * len(error)
     parts = [(tuple(kind), error[which.reshape(-1) == k]) for k, kind in enumerate(kinds.tolist())]
-    return {kind: _size(part) for kind, part in parts if len(part) >= LEAST}, False
+    return {kind: _size(part) for kind, part in parts if len(part) >= ENOUGH}, False
 
 
 def _size(error: NDArray[np.float64]) -> float:

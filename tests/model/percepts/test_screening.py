@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relgym.config.constants import ENOUGH
 from relgym.model.learning.fitting import compare_and_learn
-from relgym.model.percepts.screening import ALIKE, FACTOR, GENEROUS, MOST, RUN, START, Screen
+from relgym.model.percepts.screening import FACTOR, GENEROUS, MOST, RUN, Screen
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -66,7 +67,7 @@ def test_a_rare_event_of_about_the_same_size_is_believed() -> None:
     for _ in range(40):
         taken.append(admits(screen, 1e4 * rng.uniform(1.0, 2.0)))
         assert admits(screen, 3.0)
-    assert taken == [False] * (ALIKE - 1) + [True] * (41 - ALIKE)
+    assert taken == [False] * (ENOUGH - 1) + [True] * (41 - ENOUGH)
 
 
 def test_a_rare_reward_is_believed_sooner_and_huge_numbers_never() -> None:
@@ -118,27 +119,29 @@ def test_limits_by_hand() -> None:
     assert (
         limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [GENEROUS * 2.0] * 2
     )  # 2 2 3 3 4 4: the fifth is 2
-    screen = seen(*[(4.0, 0.5)] * START)
+    screen = seen(*[(4.0, 0.5)] * ENOUGH)
     # The median of 4 and 0.5 is 2.25, and v is allowed as much as a property usually is.
     assert limits(screen) == [FACTOR * 4.0, FACTOR * 2.25]
-    still = seen(*[(4.0, 0.0)] * START)
+    still = seen(*[(4.0, 0.0)] * ENOUGH)
     assert limits(still) == [FACTOR * 4.0] * 2  # never moved: the largest of all others stands in
-    assert limits(seen(*[(0.0, 0.0)] * START)) == [GENEROUS] * 2
-    assert limits(seen(*[(1e-3, 1e-4)] * (START - 1))) == [GENEROUS] * 2  # of the first scenes 1 is the least
+    assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [GENEROUS] * 2
+    assert (
+        limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [GENEROUS] * 2
+    )  # of the first scenes 1 is the least
 
 
 def test_at_the_limit_a_number_is_admitted_and_beyond_it_not() -> None:
-    screen = seen(*[(4.0, 4.0)] * START)
+    screen = seen(*[(4.0, 4.0)] * ENOUGH)
     at = FACTOR * 4.0
     assert screen.plausible(layout(), np.array([at, -at]))
     assert not screen.plausible(layout(), np.array([np.nextafter(at, np.inf), 0.0]))
     assert not screen.plausible(layout(), np.array([0.0, -np.nextafter(at, np.inf)]))
     assert not screen.plausible(layout(), np.array([np.nan, 0.0]))
-    assert screen.to_json() == seen(*[(4.0, 4.0)] * START).to_json()  # it took note of nothing
+    assert screen.to_json() == seen(*[(4.0, 4.0)] * ENOUGH).to_json()  # it took note of nothing
 
 
 def test_equal_numbers_are_believed_the_fifth_time_though_others_come_between() -> None:
-    screen = seen(*[(4.0, 4.0)] * START)
+    screen = seen(*[(4.0, 4.0)] * ENOUGH)
     taken = []
     for k in range(6):
         taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0, 1e4])))
@@ -149,7 +152,7 @@ def test_equal_numbers_are_believed_the_fifth_time_though_others_come_between() 
 
 
 def test_the_run_is_broken_by_what_is_plain() -> None:
-    screen = seen(*[(4.0, 4.0)] * START)
+    screen = seen(*[(4.0, 4.0)] * ENOUGH)
     taken = []
     for k in range(3 * RUN):
         taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([1e4 * 5.0**k, 4.0])))

@@ -9,7 +9,7 @@ import pytest
 from points import learned, schema_of, transitions
 
 from relgym.model.reports.spread_text import labels, spread_text
-from relgym.model.target.spread import FEW_ACTIONS, Spread, Spreads, _by_action
+from relgym.model.target.spread import FEW_VALUES, Spread, Spreads, _by_action
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, ObjectType, Scene, Transition
 from relgym.scene.schema import SceneSchema
@@ -92,12 +92,12 @@ def test_nine_choices_are_told_apart() -> None:
 
 
 def test_what_is_too_much_to_be_told_apart_is_called_so() -> None:
-    error = np.random.default_rng(0).normal(size=400)
-    many = np.repeat(np.arange(FEW_ACTIONS + 1.0), 6)[:400, None]
-    few = many % FEW_ACTIONS
+    error = np.random.default_rng(0).normal(size=650)
+    many = np.repeat(np.arange(FEW_VALUES + 1.0), 10)[:, None]
+    few = many % FEW_VALUES
     assert _by_action(error[: len(many)], many) == ({}, True)
     found, pooled = _by_action(error[: len(few)], few)
-    assert list(found) == [(0.0,)]  # of the others there are fewer than eight
+    assert list(found) == [(0.0,)]  # of the others there are fewer than `ENOUGH`
     assert found[0.0,] == pytest.approx(np.sqrt(np.square(error[: len(few)][few[:, 0] == 0.0]).mean()))
     assert not pooled
     assert _by_action(error, error[:, None]) == ({}, False)  # a number, no choice
