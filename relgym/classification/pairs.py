@@ -17,14 +17,11 @@ from relgym.classification.learning import Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.config.constants import CALL, SHORT
+from relgym.config.constants import CALL, NEARLY_ALL, SHORT
 from relgym.logic.search import UNIT
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
-
-COVERED = 0.95
-"""Share of a mode's examples that another mode must explain to cover it."""
 
 
 @dataclass(slots=True)
@@ -192,5 +189,5 @@ def covered_by(assigned: Any, explained: Any) -> list[int]:
     """
     shifted = assigned - NOISE
     total = np.bincount(shifted)
-    share = np.bincount(shifted, weights=explained, minlength=len(total)) >= COVERED * np.maximum(total, 1)
+    share = np.bincount(shifted, weights=explained, minlength=len(total)) >= NEARLY_ALL * np.maximum(total, 1)
     return [int(m) + NOISE for m in np.flatnonzero(share & (total > 0)) if m + NOISE != NOISE]

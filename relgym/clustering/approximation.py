@@ -22,15 +22,13 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALTERNATIVES, CALL, ROUNDS, TYPICAL
+from relgym.config.constants import ALTERNATIVES, CALL, NEARLY_ALL, ROUNDS, TYPICAL
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "EQUAL",
     "LEFT",
-    "LEFT_LINEAR",
-    "NEARLY_ALL",
     "Approximation",
     "approximate",
     "normal_reach",
@@ -38,21 +36,15 @@ __all__ = [
     "terms_of",
 ]
 
-LEFT, LEFT_LINEAR = 0.1, 0.01
+LEFT = 0.1
 """Largest share of the change's standard deviation that an approximation may leave: with features that were asked
 for, and without any, where a coarse linear function would pass for a law."""
 
 NOISY, ALIKE = 0.5, 0.2
 """Largest share that may be left if it is noise: if residuals of neighbours are correlated by no more than this."""
 
-NEARLY_ALL = 0.9
-"""Least share of the examples that it must be good for."""
-
 MANY_FEATURES = (200, 800)
 """Among so many columns an approximation may have twice, or three times, as many terms as a mode."""
-
-TAIL: Final = 0.05
-"""Share of the changes, on either side, that the second search cuts off to begin with."""
 
 SERVED: Final = 0.7
 """Of the rows that a term serves, by more than noise, so large a share must be explained where they are few, fewer than
@@ -127,7 +119,7 @@ def approximate(
     Cost O(n d terms), some six times over, and as often again where terms go.
     """
     change = y - present
-    tamed = present + np.clip(change, *np.quantile(change, [TAIL, 1.0 - TAIL]))
+    tamed = present + np.clip(change, *np.quantile(change, [0.5 - 0.5 * NEARLY_ALL, 0.5 + 0.5 * NEARLY_ALL]))
     widths = (x.shape[1], noisy) if lines and 0 < noisy < x.shape[1] else (x.shape[1],)
     best: Approximation | None = None
     for width in widths:

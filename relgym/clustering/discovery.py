@@ -32,6 +32,7 @@ from relgym.config.constants import (
     FEW_VALUES,
     FEWEST,
     MOST_ROWS,
+    ROUGH,
     ROUNDED,
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
@@ -64,8 +65,8 @@ __all__ = [
 NEAR, MOST_NEAR = 16.0, 0.5
 """Rows that miss a function by up to so many tails are near misses; so many per inlier are too many."""
 
-QUIET, MOST_LIKE = 0.25, 0.5
-"""Residuals below so many sigma are rounding; above, those of neighbours may be alike by so much."""
+MOST_LIKE = 0.5
+"""Residuals of neighbours may be alike by so much, unless they are rounding."""
 
 EXACT = 24.0
 """Where each example verifies a function by so many bits, few of them do."""
@@ -355,7 +356,7 @@ def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own
         return False
     rows = np.flatnonzero(found.inliers)
     left = y[rows] - found.fit.predict(x[rows])
-    if float(np.sqrt(np.square(left).mean())) <= QUIET * scale.sigma:
+    if float(np.sqrt(np.square(left).mean())) * ROUGH <= scale.sigma:
         return True
     return likeness(x[rows][:, :own], left) <= MOST_LIKE
 
@@ -468,7 +469,7 @@ def _unsupported(
         yield 2 * support * fitting_cells(len(x), len(fit.columns))
         much = (ACTING * scale.tolerance) ** 2
         # Through noise, many rows that say little each determine a weight as well as a few that say much.
-        together = remaining.sum() > support * much and remaining.mean() > QUIET * scale.tolerance**2
+        together = remaining.sum() > support * much and remaining.mean() * ROUGH > scale.tolerance**2
         if remaining.max(initial=0.0) <= much and (scale.misfit or not together):
             return column, kept
     return None, everything

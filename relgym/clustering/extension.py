@@ -22,13 +22,10 @@ from numpy.typing import NDArray
 from relgym.clustering.discovery import EXACT, counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
-from relgym.config.constants import EVIDENCE, MOST_ROWS, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import ENOUGH, EVIDENCE, MOST_ROWS, ROUNDED, SEARCHED_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
-
-NEWEST: Final = 32
-"""At most so many new examples are tried."""
 
 APART: Final = 1e-3
 """Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
@@ -62,7 +59,7 @@ def extended(
     flagged, so that few pairs could agree by chance. Never by flags where the target counts something. Flags may extend
     all modes whose roles have but one object to play them, other columns only those of the target's own properties.
     Cost O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most
-    `NEWEST`.
+    `ENOUGH`.
     """
     bits = verifying_bits(known.y, known.scale)
     if not len(pool) or bits < 2.0 * EVIDENCE:
@@ -89,7 +86,7 @@ def extended(
             i,
             members[-SEARCHED_ROWS:],
             pool,
-            min(fresh, NEWEST),
+            min(fresh, ENOUGH),
             exact=exact,
             flagged=not counting,
         )

@@ -24,8 +24,6 @@ from numpy.typing import NDArray
 from relgym.clustering.approximation import (
     EQUAL,
     LEFT,
-    LEFT_LINEAR,
-    NEARLY_ALL,
     Approximation,
     approximate,
     reach,
@@ -34,7 +32,7 @@ from relgym.clustering.approximation import (
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.population import Population
 from relgym.clustering.unification import reordered
-from relgym.config.constants import FIRST, MOST_ROWS, OFTEN, RECENT, SELDOM
+from relgym.config.constants import FIRST, LITTLE, MOST_ROWS, NEARLY_ALL, OFTEN, RECENT, SELDOM
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.renewal import due
 from relgym.scheduling.work import Task
@@ -119,7 +117,7 @@ class Resort:
             floor=floor,
             terms=terms_of(len(order), population.config),
             stds=population.scale.inlier_stds,
-            left=LEFT if slots.features else LEFT_LINEAR,
+            left=LEFT if slots.features else LITTLE,
             noisy=stages[0] if slots.features else 0,
         )
         later = len(population.y) - 1 - int(recent[-1])

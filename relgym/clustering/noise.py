@@ -12,7 +12,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, RECENT, ROUGH, ROUNDINGS, TOLD
+from relgym.config.constants import ENOUGH, NEARLY_ALL, RECENT, ROUGH, ROUNDINGS, TOLD
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
@@ -22,12 +22,6 @@ TERMS = ENOUGH // 3
 
 SELECTED = 3.0
 """Choosing the best of many columns lowers the spread of pure noise by at most about this factor."""
-
-MOST_WINDOWS = 24
-"""At most about this many windows are looked at."""
-
-EXPLAINED = 0.1
-"""Share of explained examples that makes noise of another order implausible."""
 
 SINGLES = 2.0
 """The same for numbers that were rounded to single precision when they were observed."""
@@ -128,7 +122,7 @@ def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
         ends = range(ENOUGH, len(members) + 1, ENOUGH)
         found += [members[end - ENOUGH : end] for end in ends]
     found.sort(key=lambda window: int(window[0]))
-    return found[:: len(found) // MOST_WINDOWS + 1]
+    return found[:: len(found) // ENOUGH + 1]
 
 
 def _spread(x: NDArray[np.float64], y: NDArray[np.float64], columns: tuple[int, ...]) -> tuple[float, int]:
@@ -169,7 +163,7 @@ def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.fl
     y
         All responses, shape ``(n,)``.
     """
-    if explained > EXPLAINED and estimate > TOLD * sigma:
+    if explained > 1.0 - NEARLY_ALL and estimate > TOLD * sigma:
         return False
     if len(y) < RECENT and estimate > 0.5 * float(y.std()):
         return False

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
-from relgym.config.constants import EVIDENCE, MOST_ROWS, ROUNDED, TYPICAL
+from relgym.config.constants import DRAWS, ENOUGH, EVIDENCE, MOST_ROWS, ROUNDED, TYPICAL
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
@@ -26,11 +26,8 @@ BADLY = 2.0
 """Examples of a state are suspects if their errors' mean square is so many times the noise's variance, or what
 is usual where noise was underrated."""
 
-CAPPED, CLOSE = 6.0, 3.0
-"""Errors of more standard deviations count as these; examples that fit a function within these determine it."""
-
-TRIALS, LEAST_DRAWS, MOST_DRAWS = 2_000, 20, 120
-"""Functions tried on samples: about so many in all, from so many samples."""
+TRIALS = 2_000
+"""Functions tried on samples: about so many in all, from `ENOUGH` samples to `DRAWS`."""
 
 
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:
@@ -47,7 +44,7 @@ def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Sc
     scale
         Noise.
     """
-    square = np.square(np.minimum(errors / scale.sigma, CAPPED))
+    square = np.square(np.minimum(errors, scale.tail) / scale.sigma)
     _, state, count = np.unique(strata, return_inverse=True, return_counts=True)
     usual = max(1.0, float(np.median(square)) / TYPICAL**2) if len(square) else 1.0
     badly = np.bincount(state, weights=square) >= BADLY * usual * count
@@ -85,7 +82,7 @@ class Evidence:
         spread: float,
     ) -> None:
         self.x, self.y = x, y
-        self._sigma = scale.sigma
+        self._sigma, self._tolerance = scale.sigma, scale.tolerance
         self._anywhere = -np.log2(max(spread / (scale.sigma * np.sqrt(2.0 * np.pi)), 1.0))
         self._known = self._likelihood(known)
 
@@ -97,7 +94,7 @@ class Evidence:
 
     def close(self, fit: LinearFit) -> NDArray[np.bool_]:
         """Which examples a function explains well enough to be determined by them."""
-        near: NDArray[np.bool_] = np.abs(self.y - fit.predict(self.x)) <= CLOSE * self._sigma
+        near: NDArray[np.bool_] = np.abs(self.y - fit.predict(self.x)) <= self._tolerance
         return near
 
     def of(self, fit: LinearFit) -> float:
@@ -137,7 +134,7 @@ def likeliest(
     size = widest + 3
     if len(y) < 2 * size:
         return None
-    draws = int(np.clip(TRIALS // len(forms), LEAST_DRAWS, MOST_DRAWS))
+    draws = int(np.clip(TRIALS // len(forms), ENOUGH, DRAWS))
     best, bits = None, -np.inf
     for sample in draw_samples(len(y), size, draws, rng=rng, strata=strata):
         for columns, constant in forms:

@@ -29,10 +29,12 @@ __all__ = [
     "LARGE",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
+    "LITTLE",
     "MORE_ROOM",
     "MOST_BYTES",
     "MOST_ROWS",
     "MOST_STEPS",
+    "NEARLY_ALL",
     "NUMBER_BITS",
     "OFTEN",
     "POWERS",
@@ -144,6 +146,13 @@ DRAWS: Final = 96
 
 WIDE: Final = 40
 """Searches of more columns than this draw fewer and larger samples, and choose in a cheaper way."""
+
+NEARLY_ALL: Final = 0.9
+"""Share of the examples that a function must explain where others may come between: what comes from nowhere, what is
+explained by chance, what happens at a border. Of ten modes none has as many left."""
+
+LITTLE: Final = 0.01
+"""A hundredth of something is little beside it."""
 
 LEFT_OPEN: Final = 0.02
 """Share of its examples that a law may leave unexplained: contacts that no engine settles, corners. The bits of so many

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import FEWEST, LEFT_OPEN, ROUNDED, ROUNDINGS, TYPICAL
+from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, ROUNDED, ROUNDINGS, TYPICAL
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
@@ -26,9 +26,6 @@ __all__ = ["FreeLearner", "free_motion"]
 
 KEPT = 600
 """Examples of free motion that are kept."""
-
-EXPLAINS = 0.9
-"""A free law that explains a smaller share of the examples is none."""
 
 MOST_TERMS = 6
 
@@ -161,7 +158,7 @@ class FreeLearner:
             # What few constants say of a region, many may say of the bodies that happened to be there.
             if self.sources.where and law.bits > EXCEPTION_BITS * _FEW:
                 law = min(law, self._regional(x, y[:, :count], tolerance) or law, key=_law_bits)
-            if law.unexplained <= (1.0 - EXPLAINS) * len(rows):
+            if law.unexplained <= (1.0 - NEARLY_ALL) * len(rows):
                 return law
         return None
 

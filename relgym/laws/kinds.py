@@ -16,9 +16,6 @@ from relgym.laws.selection import AxisFit, fit_axis, refitted
 
 __all__ = ["KindsFit", "fit_apart", "fit_together"]
 
-JOINS = 0.98
-"""A kind of contact obeys a law of other kinds if that explains at least this share of its examples."""
-
 
 @dataclass(frozen=True, slots=True)
 class KindsFit:
@@ -108,7 +105,7 @@ def _groups(
             # Separate fits know different pieces: the larger group's form is tried on both together.
             both = np.concatenate([theirs, rows])
             joint = refitted(examples.rows(both), fit.operator, fit.pieces)
-            if joint.explained[len(theirs) :].mean() >= JOINS:
+            if joint.explained[len(theirs) :].mean() >= 1.0 - LEFT_OPEN:
                 groups[g] = (joint, [*members, kind], both)
                 break
         else:

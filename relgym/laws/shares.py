@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import FEWEST, POWERS, ROUNDED, TOLD
+from relgym.config.constants import FEWEST, LEFT_OPEN, POWERS, ROUNDED, TOLD
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -65,7 +65,7 @@ def find_share(
 
 
 def _right(left: NDArray[np.float64], told: NDArray[np.bool_], tolerance: float) -> bool:
-    return bool((left[told] <= 2.0 * tolerance).mean() >= 0.98)
+    return bool((left[told] <= 2.0 * tolerance).mean() >= 1.0 - LEFT_OPEN)
 
 
 def _trivial(

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from relgym.config.constants import CALL, ROUNDED, SAME_DIGITS, SHORT
+from relgym.config.constants import ALTERNATIVES, CALL, ROUNDED, SAME_DIGITS, SHORT
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
@@ -21,9 +21,6 @@ from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps
 
 __all__ = ["Cover"]
-
-_ATTEMPTS: Final = 8
-"""How many clauses of one search are pruned and evaluated before the search counts as fruitless."""
 
 _RELAID: Final = 0.7
 """Share of the tuples below which a search gets tables of its own."""
@@ -94,7 +91,7 @@ class Cover:
         """The best clause that tells enough about the tuples left."""
         problem = self._problem
         rest = replace(problem, weights=np.where(alive | ~problem.positive, problem.weights, 0.0))
-        for growing in (yield from self._ranked(alive, config, pure=pure))[:_ATTEMPTS]:
+        for growing in (yield from self._ranked(alive, config, pure=pure))[:ALTERNATIVES]:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))

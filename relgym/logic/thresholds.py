@@ -13,16 +13,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALL_DIGITS, ROUNDED
+from relgym.config.constants import ALL_DIGITS, LITTLE, ROUNDED
 from relgym.logic.facts import Float, Int
 
 __all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_between"]
 
 _MAX_BINS: Final = 128
 """Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
-
-_CLEAR: Final = 0.01
-"""A number counts as inside a gap if it keeps this share of the gap's width from either end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +108,7 @@ def signs_differ(low: Float | float, high: Float | float) -> NDArray[np.bool_] |
 
     Ends that are zero but for rounding are no sides: whether such a number is positive is chance.
     """
-    margin = _CLEAR * (high - low)
+    margin = LITTLE * (high - low)
     return (low < -margin) & (high > margin)
 
 
@@ -139,7 +136,7 @@ def simplest_between(low: float, high: float) -> float:
     """
     if signs_differ(low, high):
         return 0.0
-    middle, margin = low + (high - low) / 2, _CLEAR * (high - low)
+    middle, margin = low + (high - low) / 2, LITTLE * (high - low)
     for digits in range(1, ALL_DIGITS + 1):
         number = float(f"{middle:.{digits}g}")
         if low + margin <= number <= high - margin and low <= number < high:

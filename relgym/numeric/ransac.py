@@ -24,6 +24,7 @@ from relgym.config.constants import (
     CACHED,
     CALL,
     EXTRAPOLATED,
+    LITTLE,
     ROUNDED,
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
@@ -41,10 +42,6 @@ from relgym.numeric.stepwise import (
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "extrapolated", "refine"]
-
-CLOSE = 0.01
-"""Samples are extrapolated with a wider tolerance (`EXTRAPOLATED`), but not so wide, where there is noise, that it
-tells nothing: no wider than this share of the responses' spread, unless a few standard deviations are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +101,11 @@ def draw_samples(
 
 
 def extrapolated(y: NDArray[np.float64], sigma: float, *, misfit: bool) -> float:
-    """Standard deviations within which all rows may lie of a function through a few of them, at first."""
-    return EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(STDS, CLOSE * float(np.ptp(y)) / sigma))
+    """Standard deviations within which all rows may lie of a function through a few of them, at first.
+
+    Not so many, where there is noise, that they tell nothing: no more than a little of the responses' spread.
+    """
+    return EXTRAPOLATED if misfit else min(EXTRAPOLATED, max(STDS, LITTLE * float(np.ptp(y)) / sigma))
 
 
 @resumable

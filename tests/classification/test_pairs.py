@@ -154,11 +154,11 @@ def test_whose_examples_teach_a_pair_by_hand() -> None:
     assert found[1, 3].tolist() == [1, 0, -1, 1, 0, 0, 0]
 
 
-@pytest.mark.parametrize(("missed", "covered"), [(1, [3, 5]), (2, [5])])
+@pytest.mark.parametrize(("missed", "covered"), [(2, [3, 5]), (3, [5])])
 def test_a_mode_covers_those_nearly_all_of_whose_examples_it_explains(
     missed: int, covered: list[int]
 ) -> None:
-    """Nineteen of twenty are enough; noise is covered by none."""
+    """Nine of ten are enough; noise is covered by none."""
     assigned = np.array([3] * 20 + [5] * 2 + [NOISE] * 4 + [2] * 2)
     explained = np.ones(28, dtype=bool)
     explained[:missed] = explained[26] = False

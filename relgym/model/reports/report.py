@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from relgym.classification.binary import BinaryClassifier
 from relgym.classification.role_classifier import RoleKind
 from relgym.clustering.mode import Mode
+from relgym.config.constants import ROUGH
 from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
@@ -17,7 +18,6 @@ from relgym.model.reports.rules import agreement
 from relgym.model.reports.spread_text import spread_text
 from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
 from relgym.model.reports.text import Cell, as_relations, table
-from relgym.model.target.spread import ROUNDING
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
@@ -195,7 +195,7 @@ def _function(part: PropertyModel, mode: Mode, digits: int) -> str:
 def _spread(part: PropertyModel, mode: Mode) -> str:
     """A mode's spread in words, action by action where they differ much."""
     known = part.spreads.by_mode.get(mode.id)
-    if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
+    if known is None or known.whole <= max(part.clusterer.floor, part.clusterer.scale.sigma / ROUGH):
         return ""
     names = next((t.properties for t in part.schema.types if t.name == ACTION), ())
     return spread_text(known, names)

@@ -36,12 +36,12 @@ from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.role_classifier import RoleKind
 from relgym.classification.views import View
 from relgym.clustering.mode import Mode
+from relgym.config.constants import ROUGH
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
-from relgym.model.target.spread import ROUNDING
 from relgym.numeric.decision_list import Rule, decision_list
 from relgym.numeric.tree import DecisionTree
 from relgym.reporting.conditions import FLAG, Condition, Test, as_tests, equal_to, parts_of
@@ -346,7 +346,7 @@ def _branch(
 
 def _spread(part: PropertyModel, mode: int) -> float:
     known = part.spreads.by_mode.get(mode)
-    if known is None or known.whole <= max(part.clusterer.floor, ROUNDING * part.clusterer.scale.sigma):
+    if known is None or known.whole <= max(part.clusterer.floor, part.clusterer.scale.sigma / ROUGH):
         return 0.0
     return known.whole
 

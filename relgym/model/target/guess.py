@@ -23,7 +23,16 @@ from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
-from relgym.config.constants import ALTERNATIVES, FIRST, MOST_ROWS, OFTEN, RECENT, SEARCHED_CELLS, SUMMABLE
+from relgym.config.constants import (
+    ALTERNATIVES,
+    FIRST,
+    LITTLE,
+    MOST_ROWS,
+    OFTEN,
+    RECENT,
+    SEARCHED_CELLS,
+    SUMMABLE,
+)
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -38,9 +47,6 @@ SIZES = (0, 1, 2, 4, 8, 16)
 SURE = 2.0
 """A guess must be better than that nothing changes by so many standard errors: where a handful of examples makes most
 of the squares, it may be luck."""
-
-WORSE = 1.01
-"""A smaller function may be worse by this factor than the best."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,7 +273,7 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[i
     if not sure.any():
         return None, 1.0
     errors = np.where(sure, np.sqrt(squares.mean(axis=1)), np.inf)
-    first = int(np.argmax(errors <= WORSE * errors.min()))
+    first = int(np.argmax(errors <= (1.0 + LITTLE) * errors.min()))
     return sizes[first], float(errors[first]) / max(float(change.std()), float(np.finfo(np.float64).tiny))
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,10 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
-from relgym.config.constants import RECENT
+from relgym.config.constants import NEARLY_ALL, RECENT
 from relgym.model.predicting.prediction import Prediction
 
-__all__ = ["EXPLAINED", "Limits", "constants", "find_limits", "furthest"]
-
-EXPLAINED: Final = 0.95
-"""Share of a constant's examples that some other mode must take beyond it."""
+__all__ = ["Limits", "constants", "find_limits", "furthest"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +148,7 @@ def _led_beyond(clusterer: ModeClusterer, table: ExampleTable, mode: int, value:
     """Whether the other modes would have led beyond a constant nearly everywhere that it held."""
     held = np.flatnonzero(clusterer.labels == mode)[-RECENT:]
     reach = furthest(clusterer, table, held, side, without=mode)
-    return bool((reach >= side * value - clusterer.scale.tolerance).mean() >= EXPLAINED)
+    return bool((reach >= side * value - clusterer.scale.tolerance).mean() >= NEARLY_ALL)
 
 
 def constants(clusterer: ModeClusterer) -> list[Mode]:

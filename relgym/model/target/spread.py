@@ -18,16 +18,13 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import ENOUGH, FEW_VALUES, MOST_ROWS, TYPICAL
+from relgym.config.constants import ENOUGH, FEW_VALUES, MOST_ROWS, ROUGH, TYPICAL
 from relgym.model.target.spread_split import FACTOR, Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
 
 RECURRING = 0.5
 """At most so many different actions an example: a choice among many, and not a number that is hardly ever the same."""
-
-ROUNDING = 0.1
-"""A spread below this fraction of the noise assumed is mere rounding, and not worth telling."""
 
 _Action = tuple[float, ...]
 
@@ -127,7 +124,7 @@ def measure(clusterer: ModeClusterer, table: ExampleTable) -> Spreads:
         after = _actions(table, rows)
         if after is not None and after.shape[1] == own[number][1].shape[1]:
             found[number].by_action.update(_loud(*own[number], error, after))
-    quiet = max(clusterer.floor, ROUNDING * clusterer.scale.sigma)
+    quiet = max(clusterer.floor, clusterer.scale.sigma / ROUGH)
     # What an approximation leaves is a curve, no noise that depends on where one is.
     for number, spread in () if clusterer.approximate else found.items():
         if spread.whole > quiet and not spread.uneven():

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import ENOUGH, EVIDENCE
 
 __all__ = ["Split", "find_split", "place_of"]
 
-SIDE, FACTOR = 30, 3.0
-"""Examples on either side that tell its spread, and how many times as large one must be as the other."""
+FACTOR = 3.0
+"""One side's spread must be so many times as large as the other's; `ENOUGH` examples tell one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def find_split(
     state another one.
     """
     n, d = x.shape
-    if n < 2 * SIDE or not d:
+    if n < 2 * ENOUGH or not d:
         return None
     order = np.argsort(x, axis=0, kind="stable")
     values, squares = np.take_along_axis(x, order, axis=0), np.cumsum(np.square(error)[order], axis=0)
@@ -89,7 +89,7 @@ def find_split(
     whole = max(float(np.sqrt(squares[-1, 0] / n)), floor)
     gain = n * np.log2(whole) - count * np.log2(below) - (n - count) * np.log2(above)
     apart = np.maximum(below, above) > FACTOR * np.minimum(below, above)
-    gain[(values[1:] <= values[:-1]) | (count < SIDE) | (n - count < SIDE) | ~apart] = -np.inf
+    gain[(values[1:] <= values[:-1]) | (count < ENOUGH) | (n - count < ENOUGH) | ~apart] = -np.inf
     at, column = map(int, np.unravel_index(int(gain.argmax()), gain.shape))
     cost = float(np.log2(n * d))
     if gain[at, column] < cost + EVIDENCE:

@@ -20,8 +20,8 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode, sum_text
-from relgym.config.constants import ALIKE, RECENT
-from relgym.model.target.limits import EXPLAINED, constants, furthest
+from relgym.config.constants import ALIKE, NEARLY_ALL, RECENT
+from relgym.model.target.limits import constants, furthest
 
 __all__ = ["Landing", "Stop", "Stops", "find_stops"]
 
@@ -221,7 +221,7 @@ def _stops(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: str,
         if there.any():
             found.append(stop)
         explained |= there
-    return found if explained.mean() >= EXPLAINED else []
+    return found if explained.mean() >= NEARLY_ALL else []
 
 
 def _landing(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: str) -> Landing | None:
@@ -232,7 +232,7 @@ def _landing(clusterer: ModeClusterer, table: ExampleTable, mode: Mode, prop: st
     at = float(np.median(every[held]))
     slack = ALIKE * float(np.ptp(every))
     there = np.abs(every - at) <= slack
-    if there[held].mean() < EXPLAINED or held[there].mean() < EXPLAINED:
+    if there[held].mean() < NEARLY_ALL or held[there].mean() < NEARLY_ALL:
         return None
     return Landing(mode.id, mode.intercept, prop, at, slack)
 

@@ -163,7 +163,7 @@ def test_a_linear_law_wins_where_it_is_enough() -> None:
 
 
 def test_what_no_library_explains_is_called_that() -> None:
-    model = learned(SCHEMA, dice(300))
+    model = learned(SCHEMA, dice(200))
     (advice,) = model.advice()
     assert advice.features == ()
     assert "no library of features that was tried explains it" in str(advice)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
 from relgym.config import ClusteringConfig
+from relgym.config.constants import ENOUGH
 from relgym.model.reports.spread_text import spread_text
-from relgym.model.target.spread_split import SIDE, Split, find_split
+from relgym.model.target.spread_split import Split, find_split
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene
 
@@ -51,10 +52,10 @@ def test_even_noise_is_not_split(seed: int) -> None:
 def test_a_few_examples_are_no_side() -> None:
     error, x = scattered(400)
     x[:, 0] = 0.0
-    x[: SIDE - 1, 0] = 1.0
-    error[: SIDE - 1] *= 1e-3
+    x[: ENOUGH - 1, 0] = 1.0
+    error[: ENOUGH - 1] *= 1e-3
     assert find_split(error, x, ("x", "w"), 1e-9) is None
-    x[SIDE - 1, 0], error[SIDE - 1] = 1.0, 1e-3
+    x[ENOUGH - 1, 0], error[ENOUGH - 1] = 1.0, 1e-3
     found = find_split(error, x, ("x", "w"), 1e-9)
     assert found is not None
     assert (found.name, found.threshold) == ("x", 0.0)
