@@ -18,7 +18,7 @@ MOST = {
     "classification": (3, 3),
     "clustering": (29, 33),
     "hypotheses": (0, 0),
-    "laws": (18, 22),
+    "laws": (19, 22),
     "logic": (6, 3),
     "model": (55, 31),
     "numeric": (5, 15),

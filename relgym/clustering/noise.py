@@ -1,6 +1,6 @@
 """How noisy a target is: a first estimate from the data and their precision.
 
-It is estimated after 64, 512 and 4,096 examples where most are unexplained, among those with the types of objects
+It is estimated after 64, 256, 1,024, ... examples where most are unexplained, among those with the types of objects
 that most of these have, and raised or lowered: windows of the first 64 are four.
 """
 

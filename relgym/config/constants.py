@@ -114,15 +114,15 @@ is left to chance is half as much then."""
 
 RECENT: Final = 200
 """Latest examples that tell how things stand at present: five times what the thesis' modes need, so that there is a law
-among them, or it is doubtful that there is one. A share of them is known to 3 %."""
+among them, or it is doubtful that there is one. A share of them is known to 3.5 %, 1 / sqrt(4 n)."""
 
 MOST_ROWS: Final = 3_000
 """Examples that are kept for, or looked at in, one fit at most, the newest or some spread over time: more tell weights
 and spreads to less than 2 %, 1 / sqrt(n), of what they can't explain."""
 
 SEARCHED_ROWS: Final = 400
-"""Examples among which functions are searched for at a time: there are forty of a mode that is a tenth of them, and the
-squares of their distances are as many numbers as a few caches hold. What is found is fitted to more."""
+"""Examples among which functions are searched for at a time: there are forty of a mode that is a tenth of them, and all
+their distances take 1.3 MB. What is found is fitted to more."""
 
 FEWEST: Final = 4
 """Examples that found something where nothing says how sure each makes it: two that fix two weights, as most functions
@@ -135,11 +135,11 @@ FEW_VALUES: Final = 64
 """Numbers that take no more values are a choice among a few, or count something: pixels, cells, actions."""
 
 ALTERNATIVES: Final = 4
-"""Alternatives of a kind that are followed up where all would be too many, the best first: of twice as many,
-mostly none of the others is chosen in the end."""
+"""Alternatives of a kind that are followed up at most, the best first, where all would be too many: a budget, each
+takes a search or a fit."""
 
 ROUNDS: Final = 3
-"""Rounds of fitting to what the last fit explains: after so many the examples hardly change any more."""
+"""Rounds of fitting to what the fit before explains, at most: a budget."""
 
 DRAWS: Final = 96
 """Random samples of two rows: of what holds for a fifth of the rows, all but one in fifty searches draws a sample."""
@@ -149,7 +149,7 @@ WIDE: Final = 40
 
 NEARLY_ALL: Final = 0.9
 """Share of the examples that a function must explain where others may come between: what comes from nowhere, what is
-explained by chance, what happens at a border. Of ten modes none has as many left."""
+explained by chance, what happens at a border."""
 
 LITTLE: Final = 0.01
 """A hundredth of something is little beside it."""
@@ -191,10 +191,10 @@ TYPICAL: Final = 0.6744897501960817
 """Median of a normal variable's size, in standard deviations: ``NormalDist().inv_cdf(0.75)``."""
 
 SHORT: Final = 3
-"""Literals of a definition so short that a faultless one is taken as it is: hardly one in a table of clauses is."""
+"""Literals of a definition so short that a faultless one is taken as it is: hardly anything shorter would be found."""
 
 ANSWERS: Final = 4_096
-"""Answers that are remembered, until all are forgotten: some 10 MB of those of small scenes."""
+"""Answers of a kind that are remembered only to be quicker; before there are more, all are forgotten."""
 
 MOST_BYTES: Final = 32 << 20
 """Memory of what is remembered only to be quicker, and of one array that is worked on: a few of them fit anywhere."""
@@ -213,7 +213,7 @@ LARGE: Final = 1 << 14
 
 MORE_ROOM: Final = 0.125
 """Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all. A
-regression is solved anew when there are so many rows more: it lags by as few, and a solution costs as much as they."""
+regression is solved anew when there are so many rows more: it lags by a ninth of them at most."""
 
 MOST_STEPS: Final = 10**9
 """Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from relgym.config.constants import LEFT_OPEN, RECENT
+from relgym.config.constants import LEFT_OPEN
 
-__all__ = ["Ledger", "doubtful"]
+__all__ = ["SETTLED", "Ledger", "doubtful"]
 
 
 def doubtful(wrong: int, count: int, share: float) -> bool:
@@ -22,6 +22,10 @@ def doubtful(wrong: int, count: int, share: float) -> bool:
     right = count - wrong
     anyhow = math.lgamma(wrong + 1) + math.lgamma(right + 1) - math.lgamma(count + 2)
     return anyhow > wrong * math.log(share) + right * math.log1p(-share)
+
+
+SETTLED = 500
+"""Transitions, with hardly a surprise, after which laws count as settled."""
 
 
 @dataclass(slots=True)
@@ -80,7 +84,7 @@ class Ledger:
     def settled(self, type_name: str) -> bool:
         """Whether the laws have long been as they are, and wrong no more often since than laws may be (`LEFT_OPEN`)."""
         tally = self._tallies[type_name]
-        return tally.since >= RECENT and tally.wrong <= LEFT_OPEN * tally.since
+        return tally.since >= SETTLED and tally.wrong <= LEFT_OPEN * tally.since
 
     def to_json(self) -> list[list[str | int]]:
         """Plain data that `restore` reads back."""

@@ -3,23 +3,22 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.config.constants import RECENT
-from relgym.laws.ledger import Ledger, doubtful
+from relgym.laws.ledger import SETTLED, Ledger, doubtful
 
 
 def test_laws_settle_while_hardly_ever_wrong() -> None:
     ledger = Ledger(["thing"])
-    for _ in range(RECENT - 1):
+    for _ in range(SETTLED - 1):
         ledger.count("thing", right=True, learned=True)
     assert not ledger.settled("thing")
     ledger.count("thing", right=True, learned=False)
     assert ledger.settled("thing")
-    for _ in range(RECENT // 49):
+    for _ in range(SETTLED // 49):
         ledger.count("thing", right=False, learned=True)
         assert ledger.settled("thing")
     ledger.count("thing", right=False, learned=True)
     assert not ledger.settled("thing")
-    assert (ledger.seen("thing"), ledger.unlearned("thing")) == (RECENT + RECENT // 49 + 1, 0)
+    assert (ledger.seen("thing"), ledger.unlearned("thing")) == (SETTLED + SETTLED // 49 + 1, 0)
 
 
 def test_what_no_law_learns_from_is_counted_until_laws_change() -> None:

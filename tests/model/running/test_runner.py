@@ -82,7 +82,7 @@ def test_hindsight_is_followed() -> None:
     schema = schema_of(LINE_STEPS, LINE_TARGETS)
     model = learned(schema, LINE_STEPS[:200], config=ModelConfig(frames="world"))
     scene = transitions(schema, LINE_STEPS[200:201])[0].before
-    for _ in range(60):
+    for _ in range(80):
         found = model.predict_one(scene)
         model.look_back(found, {(p.object, p.property): 1.0 for p in found.parts})
     assert any(model.property_model(t.type, t.property).undecided for t in model.targets)
