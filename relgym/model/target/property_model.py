@@ -21,7 +21,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import FEWEST, LEFT_OPEN, RECENT, SEARCHED_CELLS
+from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
@@ -184,7 +184,7 @@ class PropertyModel:
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
-        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT_OPEN
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > 1.0 - NEARLY_ALL
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
