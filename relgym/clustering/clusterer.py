@@ -19,12 +19,15 @@ from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SEARCHED_CELLS, SELDOM
+from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.renewal import due
 
 __all__ = ["ClusterReport", "ModeClusterer"]
+
+ESTIMATE = 1_500_000
+"""What an estimate of the noise costs, in cells."""
 
 LESS = 0.5
 """Where most is unexplained, noise was overrated by the first few examples if more of them show so much less."""
@@ -275,7 +278,7 @@ class ModeClusterer:
         self.floor = floor
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:
-            budget.spend(SEARCHED_CELLS)
+            budget.spend(ESTIMATE)
             estimate = self._estimate(table, floor)
             if estimate is not None and self._refutes(estimate):
                 self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False

@@ -23,6 +23,9 @@ TERMS = ENOUGH // 3
 SELECTED = 3.0
 """Choosing the best of many columns lowers the spread of pure noise by at most about this factor."""
 
+MOST_WINDOWS = 24
+"""At most about this many windows are looked at."""
+
 SINGLES = 2.0
 """The same for numbers that were rounded to single precision when they were observed."""
 
@@ -122,7 +125,7 @@ def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
         ends = range(ENOUGH, len(members) + 1, ENOUGH)
         found += [members[end - ENOUGH : end] for end in ends]
     found.sort(key=lambda window: int(window[0]))
-    return found[:: len(found) // ENOUGH + 1]
+    return found[:: len(found) // MOST_WINDOWS + 1]
 
 
 def _spread(x: NDArray[np.float64], y: NDArray[np.float64], columns: tuple[int, ...]) -> tuple[float, int]:

@@ -84,7 +84,7 @@ def test_windows_hold_examples_of_one_state() -> None:
         range(1, 2 * ENOUGH, 2)
     )  # of the rest, and of the third state, too few are left
     many = _windows(np.zeros(100 * ENOUGH, dtype=int))
-    assert len(many) == 15 and [w[0] for w in many[:2]] == [0, 7 * ENOUGH]  # every seventh
+    assert len(many) == 20 and [w[0] for w in many[:2]] == [0, 5 * ENOUGH]  # every fifth
 
 
 def test_the_lower_quartile_of_spreads_is_that_of_estimates(rng: np.random.Generator) -> None:

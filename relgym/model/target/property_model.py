@@ -21,7 +21,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, RECENT, SEARCHED_CELLS
+from relgym.config.constants import FEWEST, LEFT_OPEN, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
@@ -43,6 +43,10 @@ from relgym.scene.schema import SceneSchema
 from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
+
+LEFT = 0.05
+"""Where a larger share of the latest `RECENT` examples is unexplained, regressions may know better."""
+
 
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
@@ -184,7 +188,7 @@ class PropertyModel:
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
-        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > 1.0 - NEARLY_ALL
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
