@@ -183,7 +183,7 @@ def find_mode(
         Orders in which objects may stand (`relgym.clustering.exchange`); where there are any, functions in which these
         have a say are looked for in all of them, too. What such a one explains, it explains in the order that suits.
     present
-        The column of the property's present value: where that nothing changes is said in fewer bits, it is what is found.
+        The column of the property's present value: that nothing changes is found where it takes fewer bits.
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = searched(len(y), fresh, rng) if rows is None else rows
@@ -244,9 +244,9 @@ def _simplest(
 ) -> Consensus:
     """A function, or that nothing changes if that takes fewer bits: it has no number that must be told.
 
-    Told of a function are its numbers, the values of the rows that it doesn't explain while the other one does, and what
-    both leave of the others; each number and each value in so many bits as it takes to tell values apart. So of a flag
-    that was set once, when another one was set, it isn't said that it is the other one.
+    Told of a function are its numbers, the values of the rows that it doesn't explain while the other one does, and
+    what both leave of the others; each number and each value in so many bits as it takes to tell values apart. So of a
+    flag that was set once, when another one was set, it isn't said that it is the other one.
     """
     stays = np.abs(y - x[:, present]) <= scale.tolerance
     both, bits = stays & found.inliers, verifying_bits(y, scale)

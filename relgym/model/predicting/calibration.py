@@ -875,10 +875,13 @@ class Calibration:
         self._changed()
 
     def revise(self, modes: Collection[int]) -> None:
-        """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more."""
+        """What tells when these modes hold was learned again and errs nowhere: that it erred says little any more.
+
+        A record that was good enough for all to be claimed goes on: a new one would have to show that first.
+        """
         for key, cell in self._cells.items():
             own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
-            if own is not None and own.hits < own.trials:
+            if own is not None and own.hits < own.trials and own.even() < 1.0 - self.allowed:
                 cell.records[OWN] = _Record(revised=own.revised + 1)
                 cell.squares[OWN] = [0.0, 0.0, 0.0]
                 cell._sure = None
