@@ -155,7 +155,9 @@ def _flags(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _constant(members: NDArray[np.float64], new: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which columns may be constant among a mode's members and not in some new row: others needn't be looked at."""
     low, high = members.min(axis=0), members.max(axis=0)
-    reach = np.maximum(new.max(axis=0) - low, high - new.min(axis=0))  # no new row lies further from their median
+    reach = np.maximum(
+        new.max(axis=0) - low, high - new.min(axis=0)
+    )  # no new row lies further from their median
     found: NDArray[np.bool_] = (reach > 0.0) & (high - low <= 2.0 * ROUNDED * reach)
     return found
 

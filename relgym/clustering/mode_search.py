@@ -145,7 +145,9 @@ class ModeSearch:
         while (hunt := self._hunt) is not None:
             search = self._searches.setdefault(hunt.signature, Search())
             if hunt.task is None:
-                if hunt.left == ALTERNATIVES:  # it begins: what came while it waited for its turn is news, too
+                if (
+                    hunt.left == ALTERNATIVES
+                ):  # it begins: what came while it waited for its turn is news, too
                     hunt.fresh = search.waiting
                 pool = self._pool(table, hunt.signature)
                 if not hunt.left or len(pool) < self.population.needed:  # not a failure: nothing was searched

@@ -64,7 +64,9 @@ def test_who_had_least_comes_first() -> None:
     agenda.close(agenda.open(), ["long", "longer", "new"])
     assert agenda.waiting == ("new", "long", "longer")
     agenda.close(agenda.open(), ["long", "new"])
-    agenda.close(agenda.open(), ["long", "longer", "new"])  # begun again: what an earlier search took doesn't count
+    agenda.close(
+        agenda.open(), ["long", "longer", "new"]
+    )  # begun again: what an earlier search took doesn't count
     assert agenda.waiting == ("new", "longer", "long")
 
 

@@ -468,7 +468,11 @@ class PropertyModel:
         clusters = self.clusterer.clusters
         order = sorted(range(len(modes)), key=lambda k: (-clusters[modes[k]].fitted, modes[k]))
         labels, found = self.limits.credited(
-            labels, fits[:, order], values[:, order], [modes[k] for k in order], self.clusterer.scale.tolerance
+            labels,
+            fits[:, order],
+            values[:, order],
+            [modes[k] for k in order],
+            self.clusterer.scale.tolerance,
         )
         fits = np.empty_like(found)
         fits[:, order] = found
