@@ -90,7 +90,7 @@ class Limits:
         labels, fits
             New arrays; other examples are as they were.
         """
-        labels, fits = labels.astype(np.int64), fits.copy()
+        given, fits = labels.astype(np.int64), fits.copy()
         for mode, beyond in (
             (self.low, values <= self.least + slack),
             (self.high, values >= self.most - slack),
@@ -98,8 +98,8 @@ class Limits:
             held = np.flatnonzero((labels == mode) & (mode != NOISE) & beyond.any(axis=1))
             if len(held):
                 fits[held] = beyond[held]
-                labels[held] = np.asarray(voters)[beyond[held].argmax(axis=1)]
-        return labels, fits
+                given[held] = np.asarray(voters)[beyond[held].argmax(axis=1)]
+        return given, fits
 
     def to_json(self) -> dict[str, Any]:
         """Plain data that `from_json` reads back: id and value of each bound there is."""
