@@ -245,15 +245,16 @@ class ModeClusterer:
             self.clusters[mode] = refit(cluster, table, self.rows[members], self.y[members], self.scale)
             self._split_rest(table, mode, members)
 
-    def _split_rest(self, table: ExampleTable, mode: int, members: NDArray[np.intp]) -> None:
+    def _split_rest(self, table: ExampleTable, number: int, members: NDArray[np.intp]) -> None:
         """Give a mode's examples on which none of its terms acts a mode of their own, if they are enough.
 
         Where v = 0, both ``v' = 0`` and ``v' = -0.9 v`` hold. That is rest, not bouncing: the simpler law is
         stated apart, whichever was found first.
         """
-        cluster = self.clusters[mode]
-        if self.approximate or cluster.mode.intercept != 0.0 or not cluster.mode.parameters:
-            return  # to an approximation, whatever is small looks like rest
+        cluster = self.clusters[number]
+        mode = cluster.mode
+        if self.approximate or mode.intercept != 0.0 or mode.constant or mode.persists:
+            return  # to an approximation, whatever is small looks like rest; and what persists rests at 0, too
         idle = members[np.abs(self.y[members]) <= self.scale.tolerance]
         idle = idle[cluster.idle(table, self.rows[idle], self.scale.tolerance)]
         if len(idle) < least_examples(self.y, self.scale, self.config):

@@ -90,8 +90,9 @@ def _with_one(known: Known, state: _Widened) -> _Widened | None:
     """Unify with the largest mode possible."""
     alternatives = [i for i in known.clusters if i not in state.absorbed]
     for i in sorted(alternatives, key=lambda k: (-len(known.members(k)), k)):
-        theirs = known.members(i)
-        if covering(
+        theirs, lasting = known.members(i), known.clusters[i].mode.persists
+        # Persistence is more general than a constant, even where there is hardly another value.
+        if not (lasting and state.cluster.mode.constant) and covering(
             state.cluster, known.table, known.rows[theirs], known.y[theirs], known.scale, known.config
         ):
             return state.wider(state.cluster, theirs, i)

@@ -66,6 +66,16 @@ class Mode:
         return sum(len(role.terms) for role in self.roles) + (self.intercept != 0.0)
 
     @property
+    def constant(self) -> bool:
+        """Whether it gives one value whatever there is."""
+        return not any(role.terms for role in self.roles)
+
+    @property
+    def persists(self) -> bool:
+        """Whether it says that nothing changes."""
+        return self.roles == (Role(self.target.type, ((self.target.property, 1.0),)),) and not self.intercept
+
+    @property
     def open_roles(self) -> tuple[Role, ...]:
         """All roles but the target's."""
         return self.roles[1:]

@@ -154,7 +154,7 @@ def _led_beyond(clusterer: ModeClusterer, table: ExampleTable, mode: int, value:
 def constants(clusterer: ModeClusterer) -> list[Mode]:
     """Modes without terms, unless there are no others, by value."""
     modes = [cluster.mode for cluster in clusterer.clusters.values()]
-    found = [m for m in modes if not any(r.terms for r in m.roles)]
+    found = [m for m in modes if m.constant]
     return sorted(found, key=lambda m: (m.intercept, m.id)) if len(found) < len(modes) else []
 
 
