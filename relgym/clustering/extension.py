@@ -67,7 +67,14 @@ def extended(
     if is_flag(known.y):
         value = float(known.y[pool[-1]])
         half = least_examples(known.y, known.scale, known.config) / 2
-        if int((known.y[pool] == value).sum()) >= max(2, half):
+        alike = int((known.y[pool] == value).sum())
+        if alike >= max(2, half):
+            slots, own = known.table.signatures[signature], known.target.property
+            if slots.has(0, own):  # that it stays takes no number, and so may leave an example more
+                column = slots.column(0, own)
+                stays = int((known.table.x[known.rows[pool], column] == known.y[pool]).sum())
+                if stays + bool(value) > alike:
+                    return LinearFit((column,), (1.0,), 0.0, 0.0)
             return LinearFit((), (), value, 0.0)
     if not known.clusters:
         return None
