@@ -414,7 +414,9 @@ class _Cell:
             return math.inf
         if own == 0.0:  # of who was never off nothing is left, whether or not there was anything to be said
             return math.ulp(0.0)
-        return max((own + 1e-300) / (base + 1e-300), math.ulp(0.0))  # of huge changes an exact law leaves less
+        return max(
+            (own + 1e-300) / (base + 1e-300), math.ulp(0.0)
+        )  # of huge changes an exact law leaves less
 
     def lead(self, expert: int, other: int) -> float:
         """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
