@@ -1,7 +1,8 @@
 """Other people's worlds with nothing tuned to them: what is claimed, and how right claims are.
 
 `relgym benchmark strangers` learns from 2,000 random steps of each env with the default configuration, and predicts
-fresh episodes. Envs ending in ``-v5`` need the extra ``bench-envs``. What is measured, per property:
+fresh episodes. Envs ending in ``-v5`` need the extra ``bench-envs``, those elsewhere ``bench-elsewhere``. What is
+measured, per property:
 
 - *claimed*, and *claimed and off*: by more than 5 % of the change (the median of those fresh steps that change it);
   *own*: by more than 5 % of each step's own change, however small;
@@ -35,6 +36,7 @@ from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown
 from relgym.experiments.criterion import measured
 from relgym.experiments.seeds import TRAINING_SEEDS
 from relgym.experiments.strangers.baselines import BASELINES, predicted, ridge, short
+from relgym.experiments.strangers.elsewhere import ELSEWHERE
 from relgym.experiments.strangers.made import MADE, TEXTBOOK
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
@@ -301,6 +303,7 @@ SUITE: Final = Suite(
         "named": Benchmark("Worlds that thresholds may be chosen on", _of(NAMED)),
         "others": Benchmark("Worlds that nothing was chosen on", _of(OTHERS)),
         "textbook": Benchmark("Small worlds by the textbook", _of(TEXTBOOK)),
+        "elsewhere": Benchmark("Worlds of other packages", _of(ELSEWHERE)),
         "any": Benchmark("Any worlds (--envs)", _of(())),
     },
     seeds=3,
