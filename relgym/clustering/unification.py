@@ -74,7 +74,7 @@ def unified(
     allowed = simpler_than[0].parameters + simpler_than[1].parameters
     everyone = [side[signatures[side] == signature] for side in (new, old)]
     own = slots.column(0, target.property)
-    if own in order and _persist(table.x[:, own], rows, y, everyone, scale, config):
+    if own in order and _persist(table.x[:, own], rows, y, everyone, scale):
         return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
     if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < 0.5:
         return None  # on one side whatever is multiplied by nothing would do
@@ -100,16 +100,16 @@ def _persist(
     y: NDArray[np.float64],
     sides: list[NDArray[np.intp]],
     scale: Scale,
-    config: ClusteringConfig,
 ) -> bool:
-    """Whether on each side the property keeps its value, and isn't at rest on both.
+    """Whether on each side the property mostly keeps its value, and isn't at rest on both.
 
     Of two constants ``v' = c`` this is the general law (§3.2.5), and 0 is one of them as well. It has no parameter to
-    be fitted, so that a few examples which a side owes to coincidence (v arrives at c) can't spoil it.
+    be fitted, so that examples which a side owes to something else (v arrives at c) can't spoil it: they are left, and
+    may found modes of their own.
     """
     kept = [(np.abs(y[side] - present[rows[side]]) <= scale.tolerance).mean() for side in sides]
     moving = [(np.abs(y[side]) > scale.tolerance).mean() for side in sides]
-    return bool(min(kept) >= config.unify_ratio and max(moving) >= 0.5)
+    return bool(min(kept) >= 0.5 and max(moving) >= 0.5)
 
 
 def unified_family(
