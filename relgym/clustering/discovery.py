@@ -430,9 +430,10 @@ def identified(
 
     Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it
     at nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a
-    law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations.
+    law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations. And a function of as
+    many numbers as there are values to be told is a table of constants, of which the commonest is left.
     """
-    for _ in range(len(fit.columns) + 1):
+    for _ in range(len(fit.columns) + 2):
         found = yield from refine.steps(
             x,
             y,
@@ -445,10 +446,28 @@ def identified(
             return None
         weak, kept = yield from _unsupported(x[rows], found.fit, scale, support)
         if weak is None:
-            return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
+            part = rows[_commonest(x[rows], found.fit)]
+            if not len(part):
+                return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
+            fit = least_squares(x[part], y[part], ())
+            continue
         columns = tuple(c for c in found.fit.columns if c != weak)
         fit = least_squares(x[rows[kept]], y[rows[kept]], columns)
     return None
+
+
+def _persists(fit: LinearFit) -> bool:
+    """Whether it says that something keeps its value, which takes no number."""
+    return fit.terms == 1 and bool(fit.weights) and abs(fit.weights[0] - 1.0) < ROUNDED
+
+
+def _commonest(x: NDArray[np.float64], fit: LinearFit) -> NDArray[np.intp]:
+    """Of a table of constants the rows of its commonest case; of other functions none."""
+    if not fit.weights or _persists(fit):
+        return np.empty(0, dtype=np.intp)
+    cases, which, counts = np.unique(x[:, list(fit.columns)], axis=0, return_inverse=True, return_counts=True)
+    table = len(cases) <= len(fit.weights) + (fit.intercept != 0.0)
+    return np.flatnonzero(which.reshape(-1) == counts.argmax()) if table else np.empty(0, dtype=np.intp)
 
 
 def _unsupported(
@@ -521,11 +540,8 @@ def _enough_combinations(
     x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
 ) -> bool:
     """Whether slowly changing columns take enough combinations of values to support their weights."""
-    if fit.terms == 1 and fit.weights and abs(fit.weights[0] - 1.0) < ROUNDED:
-        return True  # persistence has no free parameter
-    used = np.unique(x[:, list(fit.columns)], axis=0)
-    if fit.columns and len(used) <= len(fit.columns) + (fit.intercept != 0.0):
-        return False  # as many numbers as values to be told: a table of constants
+    if _persists(fit):
+        return True
     few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
     lively = [c for c in few if _lively(x[:, c])]
     if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:
