@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from importlib.util import find_spec
 from typing import Any, Final
 
 import gymnasium as gym
+
+from relgym.errors import ConfigError
 
 __all__ = ["ELSEWHERE", "WORLDS"]
 
@@ -35,6 +38,9 @@ ELSEWHERE: Final = tuple(f"relgym-elsewhere/{name}-v0" for name in WORLDS)
 
 def _made(name: str, **options: Any) -> gym.Env[Any, Any]:
     env_id, given = WORLDS[name]
+    package = env_id.partition(":")[0]
+    if find_spec(package) is None:
+        raise ConfigError(f"{package} is not installed: pip install 'relgym[bench-elsewhere]'")
     return gym.make(env_id, **given, **options)
 
 
