@@ -187,7 +187,7 @@ def test_looks_that_are_due_after_so_many_examples_are_taken() -> None:
     model, seen = WorldModel(BOX, targets=[SPEED]), []
     known, measure = model._parts, PropertyModel._measure
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(PropertyModel, "_measure", lambda self, table: seen.append(1) or measure(self, table))
+        patch.setattr(PropertyModel, "_measure", lambda *args: seen.append(1) or measure(*args))
         learned(model, steps(3_000))
     rows = len(known.models[SPEED].clusterer.rows)
     assert len(seen) >= rows // 256

@@ -194,9 +194,7 @@ class PropertyModel:
         self.fallback.unexplained = self._assess()
         self._unmeasured |= self.clusterer.seen % RECENT == 0
         if report.changed or (self._unmeasured and (budget is None or budget.left)):
-            self._measure(table)
-            if budget is not None:  # so that not all of many targets are measured in the same step
-                budget.spend(SEARCHED_CELLS)
+            self._measure(table, budget)
         refuted = self.limits.overstepped(y, self.clusterer.scale.tolerance)
         refuted |= self.stops.contradicted(report.mode, signature, x[0])
         mode = self._of_now(report)
@@ -300,13 +298,15 @@ class PropertyModel:
         others = {f"{t.name}.{prop}" for t in self.schema.types for prop in t.flags}
         return frozenset(others.union(self.schema.type(self.target.type).flags))
 
-    def follow(self, table: ExampleTable) -> None:
-        """The modes changed from outside: classifiers and spreads follow."""
+    def follow(self, table: ExampleTable, budget: Budget | None = None) -> None:
+        """The modes changed from outside: classifiers follow at once, spreads as soon as the budget allows it."""
         self._follow(table)
         self.fallback.unexplained = self._assess()
-        self._measure(table)
+        self._unmeasured = True
+        if budget is None or budget.left:
+            self._measure(table, budget)
 
-    def _measure(self, table: ExampleTable) -> None:
+    def _measure(self, table: ExampleTable, budget: Budget | None) -> None:
         """How far examples scatter, and how far approximations go."""
         self._unmeasured = False
         self.spreads = measure(self.clusterer, table)
@@ -317,6 +317,8 @@ class PropertyModel:
         self.fallback.scope = (
             find_scope(self.clusterer, table, guessing=self.fallback.lawless) if asked else EVERYWHERE
         )
+        if budget is not None:  # so that not all of many targets are measured in the same step
+            budget.spend(SEARCHED_CELLS)
 
     def start_over(self, table: ExampleTable) -> None:
         """Learn all classifiers anew, of what they remember."""
@@ -365,12 +367,12 @@ class PropertyModel:
     def go_on(self, table: ExampleTable, budget: Budget) -> None:
         """Go on with a search for modes that is under way, as far as the budget goes."""
         if self.clusterer.go_on(table, budget):
-            self.follow(table)
+            self.follow(table, budget)
 
     def approximate(self, table: ExampleTable, budget: Budget) -> None:
         """Look for an approximation if one is due, as far as the budget goes."""
         if self.clusterer.approximate_now(table, budget):
-            self.follow(table)
+            self.follow(table, budget)
 
     def search(self, table: ExampleTable, budget: Budget) -> None:
         """Finish the searches that are under way or due, those of a target that has begun anew among them."""
