@@ -286,6 +286,10 @@ class _Record:
         """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
         return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
 
+    def share_of(self, speaker: int, prior: float, bits: float = 0.0) -> float:
+        """`share` of an expert's values; that what held last goes on is a guess at what is hidden, and no law."""
+        return self.mean(prior) if speaker == LATEST else self.share(prior, bits)
+
     def share(self, prior: float, bits: float = 0.0) -> float:
         """How probably the next one is a hit.
 
@@ -349,11 +353,13 @@ class _Cell:
         if speaks:
             record.errors = _counted(record.errors, _place(error), times)
 
-    def count(self, errors: Sequence[float], within: float, times: int = 1) -> None:
-        """Take in what each expert was off by, so many times; the best one speaks, if it leads by enough."""
+    def count(
+        self, errors: Sequence[float], within: float, times: int = 1, spoke: int | None = None
+    ) -> None:
+        """Take in what each expert was off by, so many times, and who spoke; who is best speaks, if by enough."""
         self._sure = None
         for expert in {OWN, self.speaker, *_VALUES}:
-            self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker))
+            self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker, spoke))
         base = errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
@@ -403,7 +409,7 @@ class _Cell:
             able = [k for k, sums in enumerate(self.squares) if sums[0]]
             speaker = self.preferred(able, claims) if able else OWN
             known = self.records.get(speaker)
-            share = 0.5 if known is None else known.share(0.5, bits)
+            share = 0.5 if known is None else known.share_of(speaker, 0.5, bits)
             self._sure = bits, share if _makes_claims(speaker) else 0.0
         return self._sure[1]
 
@@ -582,22 +588,22 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-            better = self._unheard(trusted, speaker, able)
-            if better is not None:
-                speaker, trusted = better, self._whole()
-                family, known = trusted, [trusted]
+            if not _makes_claims(speaker):
+                usual = self._usual(able, speaker)
+                if not trusted.squares[usual][0]:  # never heard here
+                    trusted = family = self._whole()
+                    speaker, known = usual, [trusted]
+                elif trusted.lead(speaker, usual) < EVIDENCE:
+                    speaker = usual
         elif not self._cells or (OWN in able and self._vouches(family, bits)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
-            speaker = min((k for k in able if k not in (OWN, LATEST)), key=trusted.left)
-            if trusted.lead(speaker, PERSISTENCE) < EVIDENCE:
-                speaker = PERSISTENCE
-            known = [trusted]
+            speaker, known = self._usual(able, PERSISTENCE), [trusted]
         latest = next((c for c in (cell, winner) if c is not None and speaker in c.records), None)
         said = _Record() if latest is None else latest.records[speaker]
         prior, bits = _mean(family, speaker), bits if speaker == OWN else 0.0
-        share = said.share(prior, bits) if self.trials else math.nan
+        share = said.share_of(speaker, prior, bits) if self.trials else math.nan
         if latest is not None and speaker == OWN:
             share = min(share, latest.credit(prior, bits))
         if not known:
@@ -620,16 +626,11 @@ class Calibration:
         told = self._assess(nearer, able)
         return told._replace(probability=min(told.probability, 0.5))
 
-    def _unheard(self, cell: _Cell, speaker: int, able: tuple[int, ...]) -> int | None:
-        """Who was never heard in a cell, but elsewhere codes best by enough; None: nobody, or a mode or law speaks."""
-        if _makes_claims(speaker):
-            return None
-        others = [k for k in able if k in _VALUES and not cell.squares[k][0]]
-        if not others:
-            return None
+    def _usual(self, able: tuple[int, ...], speaker: int) -> int:
+        """Who codes best in all cells together, if by enough; else who would speak."""
         whole = self._whole()
-        best = min(others, key=whole.left)
-        return best if whole.lead(best, speaker) >= EVIDENCE else None
+        best = min((k for k in able if k not in (OWN, LATEST)), key=whole.left)
+        return best if whole.lead(best, speaker) >= EVIDENCE else speaker
 
     def _vouches(self, family: _Cell | None, bits: float) -> bool:
         """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.
@@ -789,7 +790,7 @@ class Calibration:
             if key.lead == OF_FAMILY:
                 cell.note(audit.speaker, errors, within, many)
             else:
-                cell.count(errors, within, many)
+                cell.count(errors, within, many, audit.speaker)
             if cell.since is not None:
                 cell.since = cell.since + many if errors[OWN] <= within else 0
                 if cell.credit(0.5, self._bits(_who(key))) > self.probability:
