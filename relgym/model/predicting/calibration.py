@@ -463,6 +463,9 @@ class Calibration:
     ----------
     trials
         Predictions that somebody looked back at.
+    accounted
+        Whether laws explain what is seen. Only then do modes that were right vouch for a new one: where more is
+        unexplained, what was found may be part of what nothing explains, and is to prove itself first.
     """
 
     def __init__(self, probability: float = 0.9, slips: float = 0.0075, hypotheses: int = 0) -> None:
@@ -478,6 +481,7 @@ class Calibration:
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
+        self._accounted = True
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
@@ -496,6 +500,16 @@ class Calibration:
         self._united = None
         if cells:
             self._kinds.clear()
+
+    @property
+    def accounted(self) -> bool:
+        return self._accounted
+
+    @accounted.setter
+    def accounted(self, holds: bool) -> None:
+        if holds != self._accounted:
+            self._accounted = holds
+            self._changed()
 
     @property
     def change(self) -> float:
@@ -595,7 +609,7 @@ class Calibration:
                     speaker, known = usual, [trusted]
                 elif trusted.lead(speaker, usual) < EVIDENCE:
                     speaker = usual
-        elif not self._cells or (OWN in able and self._vouches(family, bits)):
+        elif not self._cells or (OWN in able and self._vouches(family, bits, key)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
@@ -632,11 +646,13 @@ class Calibration:
         best = min((k for k in able if k not in (OWN, LATEST)), key=whole.left)
         return best if whole.lead(best, speaker) >= EVIDENCE else speaker
 
-    def _vouches(self, family: _Cell | None, bits: float) -> bool:
+    def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
         """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.
 
         Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
         """
+        if key.winner > 0 and not self.accounted:
+            return False
         if not _Record().share(_mean(family, OWN), bits) > self.probability:
             return False
         left = self._whole().left(OWN)

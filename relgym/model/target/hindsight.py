@@ -332,9 +332,11 @@ def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
     """Take over what `calibration_to_json` wrote."""
     for target in parts.targets:
         if str(target) in data:
-            parts.models[target].calibration = Calibration.from_json(
+            model = parts.models[target]
+            model.calibration = Calibration.from_json(
                 data[str(target)],
                 parts.config.claim_probability,
                 parts.config.claim_slips,
                 len(parts.config.hypotheses),
             )
+            model.calibration.accounted = model.accounted_for

@@ -189,6 +189,7 @@ class PropertyModel:
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
         self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
+        self.calibration.accounted = self.accounted_for
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
@@ -388,14 +389,14 @@ class PropertyModel:
         left = float("inf") if budget is None else budget
         spent = self.classifier.refresh(left, self.amended)
         spent += self.casting.refresh(self.classifier.exemplars, left - spent, self.amended)
-        if self.amended and self._accounted_for:
+        if self.amended and self.accounted_for:
             revised = self.amended & self.classifier.flawless - self.casting.flawed
             self.amended -= revised
             self.calibration.revise(revised)
         return spent
 
     @property
-    def _accounted_for(self) -> bool:
+    def accounted_for(self) -> bool:
         """Whether laws explain what was seen: else what a mode got wrong may be what nothing explains."""
         known = self.clusterer
         return not known.approximate and known.noise_examples <= LEFT_OPEN * known.seen
@@ -453,6 +454,7 @@ class PropertyModel:
         values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
         labels, fits = self._credited(self.clusterer.labels[numbers], fits, values, ids)
         self.calibration.keep(ids)
+        self.calibration.accounted = self.accounted_for
         self.amended = set(ids) if self.limits != before else self.amended.intersection(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
