@@ -370,7 +370,7 @@ class _Cell:
                 sums[2] += times * base
         if errors[self.speaker] == 0.0 and self.squares[self.speaker][1] == 0.0:
             return  # nobody is better than who was never off
-        best = min((k for k, error in enumerate(errors) if error == error), key=self.left)
+        best = self.best([k for k, error in enumerate(errors) if error == error])
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {k: r for k, r in self.records.items() if k in (OWN, *_VALUES)}
             if self.speaker in _VALUES:
@@ -418,11 +418,19 @@ class _Cell:
         trials, own, base = self.squares[expert]
         if not trials:
             return math.inf
-        if own == 0.0:  # of who was never off nothing is left, whether or not there was anything to be said
+        # Of who was never off nothing is left, whether or not there was anything to be said; but that what held last
+        # goes on is worth something only where that nothing changes is off.
+        if own == 0.0 and (base or expert != LATEST):
             return math.ulp(0.0)
         return max(
             (own + 1e-300) / (base + 1e-300), math.ulp(0.0)
         )  # of huge changes an exact law leaves less
+
+    def best(self, able: Collection[int]) -> int:
+        """Who of some codes best; of equals the winner, else that nothing changes, which takes no number to say."""
+        left = {k: self.left(k) for k in able}
+        least = min(left.values())
+        return next((k for k in (OWN, PERSISTENCE) if left.get(k) == least), min(left, key=left.__getitem__))
 
     def lead(self, expert: int, other: int) -> float:
         """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
@@ -443,7 +451,7 @@ class _Cell:
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
             if self.left(OWN) <= LEAVE * LEAVE * least:
                 return OWN
-        return self.speaker if self.speaker in able else min(able, key=self.left)
+        return self.speaker if self.speaker in able else self.best(able)
 
 
 class Calibration:
@@ -643,7 +651,7 @@ class Calibration:
     def _usual(self, able: tuple[int, ...], speaker: int) -> int:
         """Who codes best in all cells together, if by enough; else who would speak."""
         whole = self._whole()
-        best = min((k for k in able if k not in (OWN, LATEST)), key=whole.left)
+        best = whole.best([k for k in able if k not in (OWN, LATEST)])
         return best if whole.lead(best, speaker) >= EVIDENCE else speaker
 
     def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
