@@ -655,16 +655,13 @@ class Calibration:
         return best if whole.lead(best, speaker) >= EVIDENCE else speaker
 
     def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
-        """Whether modes, or laws, were right often enough for a new one to have the word, and hardly left more than is.
+        """Whether modes, or laws, were right often enough, where they said that something changes, for a new one to speak.
 
         Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
         """
         if key.winner > 0 and not self.accounted:
             return False
-        if not _Record().share(_mean(family, OWN), bits) > self.probability:
-            return False
-        left = self._whole().left(OWN)
-        return math.isinf(left) or left <= LEAVE * LEAVE
+        return _Record().share(_mean(family, OWN), bits) > self.probability
 
     def _whole(self) -> _Cell:
         """What all cells know together."""
@@ -811,8 +808,9 @@ class Calibration:
             if key not in self._cells:
                 self._cells[key] = _Cell.new(audit.speaker, self.experts)
             cell = self._cells[key]
-            if key.lead == OF_FAMILY:
-                cell.note(audit.speaker, errors, within, many)
+            if key.lead == OF_FAMILY:  # what is right because nothing changes vouches for nobody
+                if not abs(audit.values[OWN] - audit.values[PERSISTENCE]) <= rounding:
+                    cell.note(audit.speaker, errors, within, many)
             else:
                 cell.count(errors, within, many, audit.speaker)
             if cell.since is not None:
