@@ -6,18 +6,19 @@ that nothing changes. A learner that predicts before each step reports how each 
 approximation how far from what it was made of it is asked; in those of its winner where there are few trials. Of a cell
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
-  `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984). A law that can be claimed keeps the word
-  where it is hardly worse;
+  `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984), and who does in all cells together where
+  it doesn't trail by as many. A law that can be claimed keeps the word where it is hardly worse;
 - the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
-  laws, said with this outcome; and until the first miss what speaks may be a law that is always right. A hit is off by
-  no more than `ModelConfig.claim_error` of what mostly changes;
+  laws, said of changes with this outcome; and until the first miss a mode or law may be one that is always right. A hit
+  is off by no more than `ModelConfig.claim_error` of what mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
 Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
 law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was
 believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
 known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
-Where it had none yet, all cells together tell whether it speaks.
+Where it had none yet, all cells together tell whether it speaks. A new mode speaks at once if others were right in what
+they said of changes, and laws explain what is seen; else it is to prove itself first.
 
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
@@ -353,9 +354,7 @@ class _Cell:
         if speaks:
             record.errors = _counted(record.errors, _place(error), times)
 
-    def count(
-        self, errors: Sequence[float], within: float, times: int = 1, spoke: int | None = None
-    ) -> None:
+    def count(self, errors: Sequence[float], within: float, times: int = 1, spoke: int | None = None) -> None:
         """Take in what each expert was off by, so many times, and who spoke; who is best speaks, if by enough."""
         self._sure = None
         for expert in {OWN, self.speaker, *_VALUES}:
@@ -471,9 +470,6 @@ class Calibration:
     ----------
     trials
         Predictions that somebody looked back at.
-    accounted
-        Whether laws explain what is seen. Only then do modes that were right vouch for a new one: where more is
-        unexplained, what was found may be part of what nothing explains, and is to prove itself first.
     """
 
     def __init__(self, probability: float = 0.9, slips: float = 0.0075, hypotheses: int = 0) -> None:
@@ -511,6 +507,10 @@ class Calibration:
 
     @property
     def accounted(self) -> bool:
+        """Whether laws explain what is seen; only then do modes that were right vouch for a new one.
+
+        Where more is unexplained, what was found may be part of what nothing explains, and is to prove itself first.
+        """
         return self._accounted
 
     @accounted.setter
@@ -655,7 +655,7 @@ class Calibration:
         return best if whole.lead(best, speaker) >= EVIDENCE else speaker
 
     def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
-        """Whether modes, or laws, were right often enough, where they said that something changes, for a new one to speak.
+        """Whether modes, or laws, were right often enough in what they said of changes for a new one to speak.
 
         Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
         """
