@@ -277,7 +277,8 @@ class WorldModel:
         predicted and came true, and what is only roughly known: of that some is left out (`ModelConfig.downsampling`).
         """
         self._check_step(transition)
-        numbers = 3 * len(transition.before.vector)
+        scenes = transition.before, transition.after, prediction.scene
+        numbers = sum(len(scene.vector) for scene in scenes)
         precision = self._told(prediction, residuals, precision)
         report: LearnReport = self._made(
             "_take_up", transition, prediction, dict(residuals), precision, numbers=numbers

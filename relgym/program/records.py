@@ -26,10 +26,16 @@ __all__ = [
     "CONTEXTS",
     "EXPERTS",
     "FRAMES",
+    "FREE",
     "LEAST_RATE",
     "MOST_BODIES",
+    "NO_RUNNER_UP",
+    "OF_ALL",
+    "OF_FAMILY",
+    "OF_WINNER",
     "RATES",
     "SAYS",
+    "TOUCHING",
     "WIDER",
     "Answer",
     "AxisRule",
@@ -85,7 +91,18 @@ CONTEXTS = ("approached", "touching", "all")
 """Which objects a clause may mention: what the target approaches fastest, what is close to it, or all."""
 
 EXPERTS = ("own", "guess", "regression", "latest", "persistence")
-"""Who may give a value (`relgym.model.predicting.calibration.EXPERTS`): those of whom a `Belief` tells by bits."""
+"""Who may give a value, and of whom a `Belief` tells by bits: the winner of the vote (or the law); the guess;
+regressions on everything; the mode that held last, since what decides may be hidden, and a law that changed stays
+changed; and that nothing changes."""
+
+FREE, TOUCHING = 1, 2
+"""What predictions by laws name in place of a mode: the free law, or laws of touching pairs on top of it."""
+
+NO_RUNNER_UP = 7
+"""Bin of leads where there is nobody to lead."""
+
+OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
+"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
 
 FRAMES = ("contact", "point", "turned", "centres", "own", "world")
 """Frames of contact laws (`relgym.laws.frames`)."""

@@ -76,7 +76,7 @@ class _Source:
         add("# ---- how a prediction came about")
         for k, (name, sentence) in enumerate(zip(_OUTCOMES, self.sentences, strict=True)):
             add(f"{name} = {k}  # {sentence}")
-        add("FREE, TOUCHING = 1, 2  # what laws of motion name in place of a mode\n")
+        add(f"FREE, TOUCHING = {ir.FREE}, {ir.TOUCHING}  # what laws of motion name in place of a mode\n")
         if p.bodies:
             self._bodies()
         if p.motion is not None:

@@ -782,7 +782,7 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
                 names.add(name)
         name = f"regression{k}.left"
         if name in arrays:  # which earlier files don't say
-            _rows(arrays, name, "float64", (KINDS * (len(RATES) + 1), len(regression.targets)))
+            _rows(arrays, name, "float64", (len(KINDS) * (len(RATES) + 1), len(regression.targets)))
             fits = np.isfinite(arrays[name]).all() and (arrays[name] >= 0.0).all()
             _require(fits, f"history: {name}", "expected mean squares")
             names.add(name)

@@ -11,9 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from relgym.config.constants import EVIDENCE
+from relgym.config.constants import EVIDENCE, MEMORY
 from relgym.model.parts import Parts
-from relgym.model.predicting.calibration import MEMORY
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.scene.objects import TASK, Target
 from relgym.scheduling.agenda import Budget

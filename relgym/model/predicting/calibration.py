@@ -36,6 +36,7 @@ model that was never told how its predictions came out nothing is known, and not
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -45,7 +46,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import EVIDENCE, SUMMABLE
+from relgym.config import ModelConfig
+from relgym.config.constants import COVERED, EVIDENCE, MEMORY, SUMMABLE
+from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_WINNER
 
 __all__ = [
     "EXPERTS",
@@ -59,10 +62,6 @@ __all__ = [
     "keys_of",
     "lead_bins",
 ]
-
-EXPERTS: Final = ("own", "guess", "regression", "latest", "persistence")
-"""Who may give a value: the winner of the vote (or the law); the guess; regressions on everything; the mode
-that held last, since what decides may be hidden, and a law that changed stays changed; and that nothing changes."""
 
 OWN, GUESS, REGRESSION, LATEST, PERSISTENCE = range(len(EXPERTS))
 
@@ -79,24 +78,11 @@ _VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
-MEMORY: Final = 1024
-"""Of more trials than this the older ones count half: a share of 99 % is known to 0.4 % from half as many, and a lead
-of 10 bits is one of 1.4 % in root mean square."""
-
 FEW: Final = 32
 """In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
 
 LEAVE: Final = 1.1
 """A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
-
-PRIOR: Final = 1.0
-"""Trials that the prior of a share counts for, as Jeffreys' does."""
-
-COVERED: Final = 0.95
-"""Share of what comes that intervals are to hold."""
-
-ENOUGH: Final = 19
-"""Fewest errors that can tell such an interval: the largest of them does then."""
 
 OCTAVE: Final = 4
 """Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
@@ -104,16 +90,11 @@ OCTAVE: Final = 4
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""
 
-
-NO_RUNNER_UP: Final = 7
-"""Bin of leads where there is nobody to lead."""
+_DEFAULT: Final = ModelConfig()
 
 FAR: Final = range(NO_RUNNER_UP, NO_RUNNER_UP + NO_RUNNER_UP)[1:]
 """Bins of leads of approximations that are asked far from what they were made of, as many as of leads: octaves of the
 squared distance (`relgym.model.predicting.regression.Regressed`), with which a misfit grows."""
-
-OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
-"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
 
 
 class Key(NamedTuple):
@@ -189,7 +170,8 @@ def keys_of(
     leads = lead_bins(margins)
     if far is not None:
         leads = np.where(far > 0, far, leads)
-    for rows in _groups((winners << 10) + (outcomes.astype(np.int64) << 4) + leads):
+    kinds = int(outcomes.max(initial=0)) + 1
+    for rows in _groups((winners * kinds + outcomes) * (FAR[-1] + 1) + leads):
         first = rows[0]
         yield Key(int(outcomes[first]), int(winners[first]), int(leads[first])), rows
 
@@ -218,7 +200,7 @@ class _Record:
     errors: dict[int, float] = field(default_factory=dict)  # trials by bin of the error
     # Over: trials in those of misses, of hits; how many. Then the mean length of those of hits in the two records
     # before this one that misses ended; 0: there was none.
-    runs: list[float] = field(default_factory=lambda: [0.0] * 6)
+    runs: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     revised: int = 0  # how often what tells when a mode holds was learned again after it had been wrong
     _even: tuple[float, float, float] | None = field(default=None, repr=False, compare=False)
 
@@ -253,7 +235,7 @@ class _Record:
         length = abs(self.run)
         before = max(self.trials - (length - times), 0.0)
         share = (max(self.hits - max(self.run - times, 0), 0.0) + 0.5) / (before + 1.0)
-        one = share if hit else max(1.0 - share, 1e-300)
+        one = share if hit else max(1.0 - share, sys.float_info.min)
         # Where hits, or misses, mostly come in long runs, another one is no news.
         trials, ends = self.runs[hit], self.runs[2 + hit]
         again = max(one, (trials - ends + one) / (trials + 1.0))
@@ -270,7 +252,7 @@ class _Record:
             self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
             if not hit and self.runs[3]:
                 self.runs[4:] = self.runs[5], self.runs[1] / self.runs[3]
-            self.runs[:4] = [0.0] * 4
+            self.runs[:4] = [0.0, 0.0, 0.0, 0.0]
         if self.trials > MEMORY:
             self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
         if self.runs[0] + self.runs[1] > MEMORY:
@@ -284,8 +266,8 @@ class _Record:
         return self._even[2]
 
     def mean(self, prior: float) -> float:
-        """Posterior mean of the share of hits, after a beta distribution of `PRIOR` trials around the given mean."""
-        return (self.hits + prior * PRIOR) / (self.trials + PRIOR)
+        """Posterior mean of the share of hits; the prior has the given mean and counts for one trial, as Jeffreys'."""
+        return (self.hits + prior) / (self.trials + 1.0)
 
     def share_of(self, speaker: int, prior: float, bits: float = 0.0) -> float:
         """`share` of an expert's values; that what held last goes on is a guess at what is hidden, and no law."""
@@ -421,9 +403,8 @@ class _Cell:
         # goes on is worth something only where that nothing changes is off.
         if own == 0.0 and (base or expert != LATEST):
             return math.ulp(0.0)
-        return max(
-            (own + 1e-300) / (base + 1e-300), math.ulp(0.0)
-        )  # of huge changes an exact law leaves less
+        none = 1.0 / SUMMABLE  # far below the square of what isn't rounding
+        return max((own + none) / (base + none), math.ulp(0.0))  # of huge changes an exact law leaves less
 
     def best(self, able: Collection[int]) -> int:
         """Who of some codes best; of equals the winner, else that nothing changes, which takes no number to say."""
@@ -435,7 +416,8 @@ class _Cell:
         """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
         trials = min(self.squares[expert][0], self.squares[other][0] or math.inf)
         ratio = self.left(other) / self.left(expert)
-        return 0.5 * trials * math.log2(min(max(ratio, 1e-300), 1e300))
+        most = sys.float_info.max
+        return 0.5 * trials * math.log2(min(max(ratio, 1.0 / most), most))
 
     def preferred(self, able: Collection[int], claims: tuple[float, float]) -> int:
         """Who of those who have a value speaks.
@@ -472,7 +454,12 @@ class Calibration:
         Predictions that somebody looked back at.
     """
 
-    def __init__(self, probability: float = 0.9, slips: float = 0.0075, hypotheses: int = 0) -> None:
+    def __init__(
+        self,
+        probability: float = _DEFAULT.claim_probability,
+        slips: float = _DEFAULT.claim_slips,
+        hypotheses: int = 0,
+    ) -> None:
         self.probability, self.allowed = probability, slips
         self.experts = len(EXPERTS) + hypotheses
         self.trials = 0
@@ -585,9 +572,9 @@ class Calibration:
         ------
         Key, set of experts, what is made of it, and whether it is claimed.
         """
-        nowhere = 1 << 20
+        nowhere = sys.maxsize  # as a lead, and for a winner: there is none such
         families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
-        rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] << 40, nowhere)) for each in families]
+        rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] * nowhere, nowhere)) for each in families]
         rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
         kinds = {k for k in self._cells if k.lead >= 0}
         if distant:
@@ -631,8 +618,7 @@ class Calibration:
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
-        few = record is None or sum(record.errors.values()) < ENOUGH
-        half = math.nan if record is None or few else _quantile(record.errors, COVERED)
+        half = math.nan if record is None else _interval(record.errors)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
 
@@ -720,7 +706,7 @@ class Calibration:
         if kinds is None:
             kinds = [c for k, c in self._cells.items() if _who(k) == who and k.lead >= 0]
             self._kinds[who] = kinds
-        left = 1.0 + 0.5 * PRIOR + self.allowed * sum([c.heard for c in kinds])
+        left = 1.0 + 0.5 + self.allowed * sum([c.heard for c in kinds])
         claims, bits = (self.probability, self.allowed), self._bits(who)
         for share, heard in sorted([(c.sure(claims, bits), c.heard) for c in kinds], reverse=True):
             if share <= self.probability:
@@ -777,7 +763,7 @@ class Calibration:
             the same is claimed again once he was right a few times.
         """
         errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
-        errors = [0.0 if abs(e) <= rounding else min(abs(e), 1e150) for e in errors]
+        errors = [0.0 if abs(e) <= rounding else min(abs(e), SUMMABLE) for e in errors]
         self.trials += not times
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
@@ -1036,7 +1022,11 @@ class Calibration:
 
     @classmethod
     def from_json(
-        cls, data: Mapping[str, Any], probability: float, slips: float = 0.0075, hypotheses: int = 0
+        cls,
+        data: Mapping[str, Any],
+        probability: float,
+        slips: float = _DEFAULT.claim_slips,
+        hypotheses: int = 0,
     ) -> Calibration:
         """Read what `to_json` wrote."""
         found = cls(probability, slips, hypotheses)
@@ -1139,7 +1129,13 @@ def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, fl
     bins[place] = bins.get(place, 0.0) + times
     if sum(bins.values()) <= MEMORY:
         return bins
-    return {k: 0.5 * v for k, v in bins.items() if v > 2.0**-10}
+    return {k: 0.5 * v for k, v in bins.items() if v > 1.0 / MEMORY}
+
+
+def _interval(bins: Mapping[int, float]) -> float:
+    """Half width of the interval that `COVERED` of what comes lies in; NaN where even the largest error can't tell."""
+    count = sum(bins.values())
+    return _quantile(bins, COVERED) if count >= COVERED * (count + 1.0) else math.nan
 
 
 def _quantile(bins: Mapping[int, float], share: float, exact: float = 0.0) -> float:

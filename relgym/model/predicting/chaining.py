@@ -11,6 +11,7 @@ circle.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import Scale, identified, is_law, law_cells
+from relgym.config.constants import ALIKE, NEARLY_ALL
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
@@ -36,17 +38,8 @@ CHECK_AT = (48, 192, 768, 3072)
 ROWS, LEAST = 300, 24
 """At most so many examples decide, the newest; fewer than `LEAST` decide nothing."""
 
-SHARE = 0.5
-"""Least share of the examples that a law with next values must explain."""
-
-GAIN = 0.1
-"""By so much larger a share it counts as better, whatever its length."""
-
 PLANS = ((2, 5, 256), (4, 10, 128))
 """Terms, sample size and draws of the searches for such a law."""
-
-ALIKE = 0.1
-"""Weights of x' and of x that cancel out but for this share make a difference of the two."""
 
 _Pair = tuple[str, str]
 
@@ -147,8 +140,8 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     ids = table.signature_ids[clusterer.rows[recent]]
     recent = recent[ids == ids[-1]]
     share = float((clusterer.labels[recent] != 0).mean())
-    size = max((m.parameters for m in model.modes), default=99)
-    if share >= 1.0 - GAIN and size <= 2:
+    size = max((m.parameters for m in model.modes), default=math.inf)
+    if share >= NEARLY_ALL and size <= 2:
         return None
     slots = table.signatures[int(ids[-1])]
     free = _free(parts, target)
@@ -169,11 +162,13 @@ def _better(
     scales: tuple[Scale, ...],
     *,
     share: float,
-    size: int,
+    size: float,
     seed: int,
     support: int,
 ) -> Steps[_Found | None]:
     """The law with next values that explains more of some rows than modes do, or as many more briefly.
+
+    It must explain half of them; where it explains a tenth more it is better, whatever its length.
 
     Parameters
     ----------
@@ -203,10 +198,10 @@ def _better(
         )
         if found is not None:
             found = yield from identified.steps(x, y, found.fit, scale=scale, support=support)
-        if found is None or found.size < SHARE * len(y) or not is_law(x, y, found, x.shape[1], scale):
+        if found is None or 2 * found.size < len(y) or not is_law(x, y, found, x.shape[1], scale):
             continue
-        gain = found.size / len(y) - share
-        if gain <= GAIN and (gain <= -GAIN or found.fit.terms >= size):
+        gain, little = found.size / len(y) - share, 1.0 - NEARLY_ALL
+        if gain <= little and (gain <= -little or found.fit.terms >= size):
             continue
         yield law_cells(found, x.shape[1])
         law = _read(slots, order, found.fit)
@@ -241,10 +236,11 @@ def _read(slots: SlotSignature, order: NDArray[np.intp], fit: LinearFit) -> _Fou
     now = {key: weights.get((key[0], key[1].rstrip(PRIME)), 0.0) for key in nexts}
     given = tuple(dict.fromkeys((slots.types[slot].name, prop.rstrip(PRIME)) for slot, prop in nexts))
     inert = 0 in fit.columns
-    cancel = any(abs(w + now[key]) < ALIKE * abs(w) for key, w in nexts.items())
+    # Weights of x' and of x that nearly all cancels out of make a difference of the two.
+    cancel = any(abs(w + now[key]) < (1.0 - NEARLY_ALL) * abs(w) for key, w in nexts.items())
     lead = None
     if inert and len(columns) == 2 and fit.intercept == 0.0:
         (((_, rate), coefficient),) = nexts.items()
         own = sum(fit.weights) - coefficient
-        lead = (rate.rstrip(PRIME), coefficient) if abs(own - 1.0) < 1e-6 else None
+        lead = (rate.rstrip(PRIME), coefficient) if abs(own - 1.0) < ALIKE else None
     return _Found(given, inert, cancel and not inert, lead)

@@ -19,13 +19,11 @@ from relgym.laws.touching import Cast, Contacts
 from relgym.model.percepts.perception import Percept
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.target.property_model import PropertyModel, Verdict
+from relgym.program.records import FREE, TOUCHING
 from relgym.scene.objects import ACTION, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["FREE", "TOUCHING", "Laws", "mode_bits", "possible_targets"]
-
-FREE, TOUCHING = 1, 2
-"""What predictions by laws name in place of a mode: the free law, or laws of touching pairs on top of it."""
+__all__ = ["Laws", "mode_bits", "possible_targets"]
 
 WEIGH_EVERY = 50
 """Laws and modes are weighed against each other after so many transitions, and whenever the laws change."""

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 from relgym.arguments import refusing
 from relgym.config.checks import checked_count
+from relgym.config.constants import MOST_STEPS
 from relgym.errors import ConfigError, ObservationError
 from relgym.html import html_table
 from relgym.model.learning.transition import LearnReport
@@ -142,7 +143,7 @@ class Prequential:
         self.steps = 0
         self.predictions: dict[Key, int] = {}
         self.wrong: dict[Key, int] = {}
-        self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, 10**9))
+        self._window: deque[tuple[Key, ...]] = deque(maxlen=checked_count("window", window, 1, MOST_STEPS))
         self._outcomes: deque[Outcomes] = deque(maxlen=self._window.maxlen)
 
     @refusing(ObservationError)

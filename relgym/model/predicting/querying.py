@@ -365,7 +365,8 @@ def _settled_many(
     """
     model = parts.models[target]
     said = _experts(parts, target, percept, index, following, verdict.values)
-    values, probability, interval = (np.full(len(said), np.nan) for _ in range(3))
+    values = np.full(len(said), np.nan)
+    probability, interval = values.copy(), values.copy()
     winners = -verdict.modes if parts.governs(target) else verdict.modes
     outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
     asks = model.tells_how_far and not parts.governs(target)

@@ -26,18 +26,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.config.constants import BEYOND, SUMMABLE
+from relgym.config.constants import BEYOND, FIRST, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
 from relgym.program.records import RATES
 from relgym.scene.objects import TASK
 
 __all__ = ["KINDS", "Regressed", "Regression"]
 
-KINDS = 2
+KINDS = ("linear", "quadratic")
 """On the numbers themselves, and on these and their squares and products."""
-
-FIRST = 64
-"""So many rows tell where a column lies and how far it varies; from then on it is regressed on."""
 
 
 class Regressed(NamedTuple):
@@ -87,8 +84,8 @@ class Regression:
         self._range = np.zeros((2, 0))  # smallest and largest change of each target
         # What is left of each target, in the mean square, if a regression's word counts by one of the rates, and if it
         # doesn't count; and how far each rate has a say.
-        self._left = np.zeros((KINDS, len(RATES) + 1, 0))
-        self._say = np.zeros((KINDS, len(RATES), 0))
+        self._left = np.zeros((len(KINDS), len(RATES) + 1, 0))
+        self._say = np.zeros((len(KINDS), len(RATES), 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
         self._texts: dict[int, tuple[NDArray[np.float32], str]] = {}  # see `_text`
 
@@ -194,9 +191,9 @@ class Regression:
         return Regressed(np.where(np.isfinite(words[:, 0]), found, np.nan), distances)
 
     def _said(self, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """What each regression says of rows of its columns, ``(n, KINDS, targets)``, and leverages, ``(n, KINDS)``."""
-        found = np.full((len(x), KINDS, len(self.targets)), np.nan)
-        leverage = np.zeros((len(x), KINDS))
+        """What each regression says of rows of its columns, ``(n, kinds, targets)``, and leverages, ``(n, kinds)``."""
+        found = np.full((len(x), len(KINDS), len(self.targets)), np.nan)
+        leverage = np.zeros((len(x), len(KINDS)))
         with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
             shown = self._shown(self._scaled(x))
             for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
@@ -205,8 +202,8 @@ class Regression:
         return np.clip(found, *self._bounds()), leverage
 
     def _growth(self) -> NDArray[np.float64]:
-        """The squared distance at a leverage of 1, for each regression, shape ``(KINDS,)``."""
-        found = np.ones(KINDS)
+        """The squared distance at a leverage of 1, for each regression, shape ``(kinds,)``."""
+        found = np.ones(len(KINDS))
         for k, ridge in enumerate(self._ridges):
             found[k] = max(1.0, ridge.rows / ridge.columns)
         return found
@@ -320,10 +317,10 @@ class Regression:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
         count = len(self.targets)
-        say = np.array(data["say"], dtype=np.float64).reshape(KINDS, count, len(RATES))
+        say = np.array(data["say"], dtype=np.float64).reshape(len(KINDS), count, len(RATES))
         self._say = np.ascontiguousarray(say.transpose(0, 2, 1))
-        left = arrays.get("left", np.zeros((KINDS * (len(RATES) + 1), count)))
-        self._left = left.reshape(KINDS, -1, count).copy()
+        left = arrays.get("left", np.zeros((len(KINDS) * (len(RATES) + 1), count)))
+        self._left = left.reshape(len(KINDS), -1, count).copy()
         for ridge in self._ridges:
             ridge.spread = np.zeros_like(ridge.spread)
         for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):

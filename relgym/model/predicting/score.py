@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import CACHED
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, ScenePrediction
 from relgym.model.reports.text import Cell, table
 from relgym.model.target.hindsight import WRONG
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from relgym.model.world_model import WorldModel
 
 __all__ = ["Score", "TargetScore", "scored"]
-
-_BATCH = 1024
-"""So many scenes with the same objects are predicted at once: memory, not results, depends on it."""
 
 
 @dataclass(slots=True)
@@ -300,7 +298,8 @@ def scored(model: WorldModel, transitions: Iterable[Transition], precision: floa
     """
     score = Score()
     for layout, run in groupby(transitions, key=lambda t: t.before.layout):
-        while batch := list(islice(run, _BATCH)):
+        many = max(1, CACHED // max(1, layout.width))  # results don't depend on it
+        while batch := list(islice(run, many)):
             before = np.stack([transition.before.vector for transition in batch])
             said = model.predict_batch(layout, before)
             claimed = said.outcomes == OUTCOMES.index(Outcome.PREDICTED)

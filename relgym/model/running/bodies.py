@@ -31,8 +31,8 @@ def check_bodies(axes: Axes, geometry: str, layout: SceneLayout) -> None:
 
 def constants_of(layout: SceneLayout) -> tuple[int, int, int]:
     """Registers of NaN, 0 and 1, behind those of the scene before and after."""
-    nan, zero, one = range(2 * layout.width, 2 * layout.width + 3)
-    return nan, zero, one
+    nan = 2 * layout.width
+    return nan, nan + 1, nan + 2
 
 
 def body_of(axes: Axes, layout: SceneLayout, number: int, spin: str | None = None) -> ir.Body:

@@ -187,7 +187,7 @@ class _Lowering:
         columns = {
             f"{what}_{letter}": 2 * k + j for k, letter in enumerate(letters) for j, what in enumerate("uv")
         }
-        columns |= {f"J_{letter}": 4 + k for k, letter in enumerate(letters)}
+        columns |= {f"J_{letter}": 2 * len(letters) + k for k, letter in enumerate(letters)}
         first, second = (tuple(_rule(rule, columns) for rule in rules) for rules in law.axes)
         numbers = tuple(tuple(int(n) for n in row) for row in chosen)
         return ir.Law(law.frame, (first, second), (numbers[0], numbers[1]))

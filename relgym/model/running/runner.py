@@ -24,7 +24,6 @@ from relgym.model.parts import Parts
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.percepts.scenes import scene_of, wrap
 from relgym.model.predicting.calibration import GUESS, LATEST, OWN, PERSISTENCE, Audit, Key
-from relgym.model.predicting.motion import TOUCHING
 from relgym.model.predicting.prediction import (
     OUTCOMES,
     BatchPrediction,
@@ -43,7 +42,7 @@ from relgym.model.target.spread import Spreads
 from relgym.model.target.spread_split import place_of
 from relgym.program.gpu import Card
 from relgym.program.machine import Machine
-from relgym.program.records import Answer, BeyondError, Program, Trust
+from relgym.program.records import TOUCHING, Answer, BeyondError, Program, Trust
 from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 

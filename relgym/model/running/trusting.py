@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from relgym.model.parts import Parts
+from relgym.model.predicting.calibration import GUESS, LATEST, OWN, REGRESSION
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
 from relgym.program import records as ir
@@ -44,8 +45,9 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         if model.candidates:
             raise ir.BeyondError("laws of hypothesis classes that were added")
         latest = _latest(model, a)
-        able = 1 | (2 if a.guess is not None or a.beyond is not None else 0)
-        able |= (4 if a.regression is not None else 0) | (8 if latest else 0)
+        guessed = a.guess is not None or a.beyond is not None
+        having = ((OWN, True), (GUESS, guessed), (REGRESSION, a.regression is not None), (LATEST, latest))
+        able = sum(1 << expert for expert, has in having if has)
         key = layout.types[index].name, a.property
         if key not in beliefs:
             beliefs[key] = tuple(_beliefs(model, able))

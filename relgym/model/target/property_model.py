@@ -21,10 +21,10 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import FEWEST, LEFT_OPEN, RECENT, SEARCHED_CELLS
+from relgym.config.constants import FEWEST, LEFT_OPEN, MEMORY, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
-from relgym.model.predicting.calibration import EXPERTS, MEMORY, OWN, Assessment, Calibration, Key
+from relgym.model.predicting.calibration import EXPERTS, OWN, Assessment, Calibration, Key
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.target.candidates import Candidates
 from relgym.model.target.casting import Casting

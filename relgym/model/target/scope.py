@@ -27,9 +27,6 @@ from relgym.scene.objects import TASK, Target
 
 __all__ = ["EVERYWHERE", "Scope", "alike", "find_scope", "spread_out"]
 
-CLOSE: Final = 0.5
-"""A mode that errs by no more than so much of what changes (root mean square) is as good as a guess."""
-
 
 @dataclass(frozen=True, slots=True)
 class Scope:
@@ -128,9 +125,9 @@ def find_scope(clusterer: ModeClusterer, table: ExampleTable, *, guessing: bool)
     table
         The rows of the examples.
     guessing
-        Whether a guess replaces modes that aren't used. Then modes aren't used where they err by more than `CLOSE` of
-        what mostly changes; without one only where it is closer to say that nothing changes: a law that is off there is
-        better than none.
+        Whether a guess replaces modes that aren't used. Then modes aren't used where they err by more than half of
+        what changes (root mean square); without one only where it is closer to say that nothing changes: a law that is
+        off there is better than none.
 
     Notes
     -----
@@ -175,7 +172,7 @@ def _lost(
     errors = np.min(
         [c.errors(table, rows, y, clusterer.scale)[0] for c in clusterer.clusters.values()], axis=0
     )
-    lost[lost] = errors > (CLOSE * float(np.sqrt(np.square(change).mean())) if guessing else change[lost])
+    lost[lost] = errors > (0.5 * float(np.sqrt(np.square(change).mean())) if guessing else change[lost])
     return lost
 
 

@@ -23,9 +23,6 @@ from relgym.model.target.spread_split import FACTOR, Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
 
-RECURRING = 0.5
-"""At most so many different actions an example: a choice among many, and not a number that is hardly ever the same."""
-
 _Action = tuple[float, ...]
 
 
@@ -206,7 +203,8 @@ def _by_action(
         return {}, False
     kinds, which = np.unique(actions, axis=0, return_inverse=True)
     if not 1 < len(kinds) <= FEW_VALUES:
-        return {}, FEW_VALUES < len(kinds) <= RECURRING * len(error)
+        # A choice among many comes twice in the mean; other numbers are hardly ever the same.
+        return {}, len(kinds) > FEW_VALUES and 2 * len(kinds) <= len(error)
     parts = [(tuple(kind), error[which.reshape(-1) == k]) for k, kind in enumerate(kinds.tolist())]
     return {kind: _size(part) for kind, part in parts if len(part) >= ENOUGH}, False
 

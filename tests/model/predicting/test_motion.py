@@ -18,10 +18,10 @@ from relgym.experiments.laws.score import taught
 from relgym.experiments.laws.trials import trial_rooms
 from relgym.experiments.laws.worlds import Ball, Material, World
 from relgym.experiments.rollouts import largest_errors
-from relgym.model.predicting.motion import FREE, TOUCHING
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.reports.report import report
 from relgym.model.world_model import WorldModel
+from relgym.program.records import FREE, TOUCHING
 from relgym.scene.objects import Scene, Target
 
 VX, VY = Target("ball", "vx"), Target("ball", "vy")
