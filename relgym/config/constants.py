@@ -28,6 +28,7 @@ __all__ = [
     "FIRST",
     "FIRST_ROOM",
     "LARGE",
+    "LAYOUTS",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
     "LITTLE",
@@ -36,11 +37,14 @@ __all__ = [
     "MOST_BYTES",
     "MOST_ROWS",
     "MOST_STEPS",
+    "MOST_TARGETS",
     "NEARLY_ALL",
     "NUMBER_BITS",
     "OFTEN",
+    "PAIRS",
     "POWERS",
     "RECENT",
+    "REPAID",
     "ROUGH",
     "ROUNDED",
     "ROUNDINGS",
@@ -207,6 +211,19 @@ ANSWERS: Final = 4_096
 
 MOST_BYTES: Final = 32 << 20
 """Memory of what is remembered only to be quicker, and of one array that is worked on: a few of them fit anywhere."""
+
+LAYOUTS: Final = 256
+"""Layouts of scenes of which something is remembered only to be quicker; before there are more, all are forgotten."""
+
+REPAID: Final = 128
+"""Times something is asked before that is made which answers sooner: to make it takes as long (rent or buy: Karlin et
+al. 1988). So the kernel, 60 ms to load, where arrays take half a millisecond; and tables of what is asked again."""
+
+PAIRS: Final = 10_000
+"""Pairs of bodies that one step looks at, at most, as many as a hundred bodies make: a budget."""
+
+MOST_TARGETS: Final = 256
+"""Properties that one model learns, at most: of more a step would take seconds."""
 
 CALL: Final = 25_000
 """What a few array operations cost however few numbers they look at, in cells: a tenth of a millisecond."""

@@ -15,9 +15,10 @@ from relgym.classification.rows import RowPool
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.config import ModelConfig
+from relgym.config.constants import LAYOUTS, MOST_TARGETS
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.percepts.perception import Percept, Perception
-from relgym.model.percepts.scenes import MOST_LAYOUTS, mismatch, next_values, passage
+from relgym.model.percepts.scenes import mismatch, next_values, passage
 from relgym.model.percepts.screening import Screen
 from relgym.model.predicting.chaining import Inquiry, Look, in_order
 from relgym.model.predicting.motion import Laws, possible_targets
@@ -28,10 +29,7 @@ from relgym.scene.schema import SceneSchema
 from relgym.scene.sizes import check_sizes
 from relgym.scheduling.agenda import Agenda
 
-__all__ = ["MOST_TARGETS", "Answer", "Parts"]
-
-MOST_TARGETS = 256
-"""More properties than this aren't learned by one model: a step would take seconds."""
+__all__ = ["Answer", "Parts"]
 
 
 class Answer(NamedTuple):
@@ -295,7 +293,7 @@ class Parts:
             for k, prop in enumerate(t.properties)
             if (t.name, prop) not in taken and prop not in t.exogenous
         ]
-        if len(self._undiscovered) >= MOST_LAYOUTS:
+        if len(self._undiscovered) >= LAYOUTS:
             self._undiscovered.clear()
         self._undiscovered[id(layout)] = layout, found
         return found
@@ -319,7 +317,7 @@ class Parts:
                 turn = math.tau if target.property in layout.types[index].angles else 0.0
                 key = layout.names[index], target.property
                 found[key] = Answer(target, self.models[target], index, column, turn)
-        if len(self._answers) >= MOST_LAYOUTS:
+        if len(self._answers) >= LAYOUTS:
             self._answers.clear()
         self._answers[id(layout)] = layout, found
         return found

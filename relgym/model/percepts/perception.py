@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relgym.classification.examples import ExampleBatch, Vocabulary
 from relgym.clustering.columns import SlotSignature, slot_order
 from relgym.clustering.features import check_entries, library_of
-from relgym.config.constants import ANSWERS
+from relgym.config.constants import ANSWERS, LAYOUTS, MOST_BYTES
 from relgym.model.percepts.grouping import distinct
 from relgym.model.percepts.sight import Seen, Sight
 from relgym.model.predicting.regression import Regressed
@@ -54,9 +54,6 @@ class Standing(NamedTuple):
 
 LinedUp: TypeAlias = tuple[NDArray[np.intp], list[bytes]]
 """The other bodies of each scene in canonical order, shape ``(n, K - 1)``, and each scene's relational state."""
-
-MOST_SIGHTS = 32
-"""For so many layouts the kernel has a work space to look at scenes in, of at most 2 MB."""
 
 
 class Situation:
@@ -262,7 +259,8 @@ class Perception:
             return None
         key = id(percept.layout)
         if key not in self._sights:
-            if len(self._sights) >= MOST_SIGHTS:
+            held = sum(sight.nbytes for sight in self._sights.values() if sight is not None)
+            if len(self._sights) >= LAYOUTS or held >= MOST_BYTES:
                 self._sights.clear()
             numbers = self.feature_columns(percept.layout)
             try:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing
+from relgym.config.constants import LAYOUTS
 from relgym.errors import ObservationError
 from relgym.scene.objects import ACTION, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
@@ -25,9 +26,6 @@ __all__ = [
     "with_action",
     "wrap",
 ]
-
-MOST_LAYOUTS = 256
-"""Of so many layouts it is kept in mind what they have in common with another one, or what is predicted in them."""
 
 
 @refusing(ObservationError)
@@ -83,7 +81,7 @@ def passage(before: SceneLayout, after: SceneLayout) -> Passage:
             if stays:
                 columns += range(before.width)[before.slice(i)]
                 sources += range(after.width)[after.slice(k)]
-        if len(known) >= MOST_LAYOUTS:
+        if len(known) >= LAYOUTS:
             known.clear()
         found = known[id(after)] = Passage(
             after, stay, np.array(columns, dtype=np.intp), np.array(sources, dtype=np.intp)

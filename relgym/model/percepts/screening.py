@@ -18,8 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, FIRST, SUMMABLE
-from relgym.model.percepts.scenes import MOST_LAYOUTS
+from relgym.config.constants import ENOUGH, FIRST, LAYOUTS, SUMMABLE
 from relgym.scene.objects import SceneLayout
 
 __all__ = ["Screen"]
@@ -143,7 +142,7 @@ class Screen:
             places = self._places(layout)
             limits, known = self._limit()[places], self._largest[places, 0]
             young = bool((self._scenes[places] < ENOUGH).any())
-            if len(self._marks) >= MOST_LAYOUTS:
+            if len(self._marks) >= LAYOUTS:
                 self._marks.clear()
             marks = self._marks[id(layout)] = _Marks(layout, places, limits, np.minimum(limits, known), young)
         return marks

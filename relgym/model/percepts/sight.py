@@ -87,6 +87,11 @@ class Sight:
         told = self._now, self._table, self._close, self._struck, self._pair, self._order
         self._see = partial(_see, machine.see, self._space.ctypes.data, *(each.ctypes.data for each in told))
 
+    @property
+    def nbytes(self) -> int:
+        """What its work space takes, in bytes; at most 2 MB."""
+        return self._space.nbytes
+
     def see(self, vector: NDArray[np.float64], body: int) -> Seen | None:
         """What a body sees of a scene; None: arrays must look, or can say why not."""
         with self._turn:  # another thread may look before this one has copied what it saw

@@ -6,6 +6,7 @@ import warnings
 from threading import Lock, Thread
 from typing import Final
 
+from relgym.config.constants import REPAID
 from relgym.errors import ConfigError, SlowWarning
 from relgym.program.gpu import Card, CardError
 from relgym.program.machine import Machine, make
@@ -13,31 +14,26 @@ from relgym.program.tape import Sizes
 
 __all__ = ["KERNEL", "Kernel"]
 
-ASKING, SCENE = 5e-4, 6e-6
-"""What arrays take to answer, in seconds: each time, and for each scene."""
-
-LOADING = 0.06
-"""What it takes to load the kernel from the disk, in seconds."""
-
 
 class Kernel:
     """The compiled kernel, as this process has it: none before it pays.
 
-    Once arrays have taken about as long as loading it takes, it is loaded in a thread of its own; where no file holds
-    it, another process compiles it first (`relgym.program.machine`). Arrays answer until it is there, with the same
-    bits: no step ever waits. What arrays took is estimated from what was asked.
+    Once arrays have taken about as long as loading it takes (`REPAID`), it is loaded in a thread of its own; where no
+    file holds it, another process compiles it first (`relgym.program.machine`). Arrays answer until it is there, with
+    the same bits: no step ever waits. What arrays took is estimated from what was asked: of many scenes at once about
+    so many take as long again as it takes to ask at all.
 
     Attributes
     ----------
     machine
         The kernel; None: not yet, or it can't be had.
-    spent
-        What arrays took so far, in seconds.
+    asked
+        How often arrays were asked so far, or what took as long.
     """
 
     def __init__(self) -> None:
         self.machine: Machine | None = None
-        self.spent = 0.0
+        self.asked = 0.0
         self._missing = ""  # why it can't be had
         self._warned = False
         self._loader: Thread | None = None
@@ -47,10 +43,10 @@ class Kernel:
     def after(self, scenes: int) -> Machine | None:
         """The kernel, if it is there, now that so many scenes more are asked."""
         if self.machine is None and not self._warned:
-            self.spent += ASKING + SCENE * scenes
+            self.asked += 1.0 + scenes / REPAID
             if self._missing:
                 self._warn()
-            elif self._loader is None and self.spent >= LOADING:
+            elif self._loader is None and self.asked >= REPAID:
                 self._loader = Thread(target=self._make, name="relgym's kernel", daemon=True)
                 self._loader.start()
         return self.machine

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
+from relgym.config.constants import REPAID
 from relgym.model.parts import Parts
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.percepts.scenes import scene_of, wrap
@@ -51,11 +52,6 @@ __all__ = ["PATIENCE", "Programs", "Runner"]
 PATIENCE = 2
 """A program is lowered for the last of so many scenes that are asked since what a model says has changed; arrays answer
 those before it, which takes about as long as to lower it (rent or buy: Karlin et al. 1988)."""
-
-SETTLING = 128
-"""Scenes asked one by one, since the model last changed, before the program is told how right its predictions were:
-to write that down takes about as long as to settle so many predictions without it. Nor does a program that couldn't
-tell scenes rest for more."""
 
 _PREDICTED, _DEPENDS = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.DEPENDS)
 _Bits = NDArray[np.int64]
@@ -102,7 +98,7 @@ class Programs:
 
         While the model learns, who gives a value is settled after the program has run. Where laws depend on what isn't
         known it can't tell, and arrays answer after all: so after each time in vain it rests for twice as many scenes
-        as before, up to `SETTLING`.
+        as before, up to `REPAID`.
         """
         if self._resting and self._looked != self.changes:
             self._resting -= 1
@@ -115,7 +111,7 @@ class Programs:
             self._resting -= 1
             return None
         said = runner.argued(scene, percept(scene))
-        self._declined = self._resting = 0 if said is not None else min(2 * self._declined + 1, SETTLING)
+        self._declined = self._resting = 0 if said is not None else min(2 * self._declined + 1, REPAID)
         return said
 
     def of(self, parts: Parts, layout: SceneLayout, scenes: int) -> Runner | None:
@@ -382,7 +378,7 @@ class Runner:
 
     def _knows(self) -> bool:
         """Whether the program knows how right its predictions were, now that one more scene is asked."""
-        if not self._settled and self._asked >= SETTLING:
+        if not self._settled and self._asked >= REPAID:
             self._settles()
         self._asked += 1
         return self._settled and self._believing

@@ -20,7 +20,7 @@ from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode, sum_text
-from relgym.config.constants import ALIKE, NEARLY_ALL, RECENT
+from relgym.config.constants import ALIKE, DIGITS, NEARLY_ALL, RECENT
 from relgym.model.target.limits import constants, furthest
 
 __all__ = ["Landing", "Stop", "Stops", "find_stops"]
@@ -69,8 +69,8 @@ class Stop:
 
     def text(self, rate: str) -> str:
         """The condition, for people, given the rate's name: ``where x + v' would be <= -1.2``."""
-        led = sum_text([(1.0, self.property), (self.step, f"{rate}'")], 0.0, 6)
-        return f"where {led} would be {'<=' if self.side < 0.0 else '>='} {self.bound:.6g}"
+        led = sum_text([(1.0, self.property), (self.step, f"{rate}'")], 0.0, DIGITS)
+        return f"where {led} would be {'<=' if self.side < 0.0 else '>='} {self.bound:.{DIGITS}g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Landing:
 
     def text(self, _: str) -> str:
         """The condition, for people: ``where v' = 0``."""
-        return f"where {self.property}' = {self.at:.6g}"
+        return f"where {self.property}' = {self.at:.{DIGITS}g}"
 
 
 @dataclass(frozen=True, slots=True)

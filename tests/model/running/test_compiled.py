@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium as gym
 import pytest
 
+from relgym.config.constants import REPAID
 from relgym.errors import SlowWarning
 from relgym.model.running import compiled
 from relgym.model.running.compiled import KERNEL, Kernel
@@ -24,8 +25,8 @@ def test_the_kernel_is_loaded_off_the_step_once_it_pays(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(compiled, "make", slowly)
     kernel = Kernel()
-    assert kernel.after(1) is None and kernel.spent > 0.0 and kernel._loader is None
-    many = int(1.01 * compiled.LOADING / compiled.SCENE)
+    assert kernel.after(1) is None and kernel.asked > 0.0 and kernel._loader is None
+    many = REPAID * REPAID
     assert kernel.after(many) is None  # a thread has begun
     assert kernel._loader is not None and kernel.after(1) is None
     going.set()
@@ -49,7 +50,7 @@ def test_who_cannot_have_it_is_told_so_once(
 ) -> None:
     monkeypatch.setattr(compiled, "make", make)
     kernel = Kernel()
-    assert kernel.after(int(1.01 * compiled.LOADING / compiled.SCENE)) is None
+    assert kernel.after(REPAID * REPAID) is None
     assert kernel._loader is not None
     kernel._loader.join()
     with pytest.warns(SlowWarning, match=why):

@@ -161,7 +161,7 @@ def fields_of(part: Prediction) -> list[object]:
 
 @pytest.mark.parametrize("name", sorted(MODELS))
 def test_a_program_that_settles_says_what_arrays_say(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "SETTLING", 0)
+    monkeypatch.setattr(running, "REPAID", 0)
     model = looked_back(MODELS[name](), seed=3)
     layout, vectors = scenes_of(model, 60, seed=4)
     for vector in vectors:
@@ -176,7 +176,7 @@ def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.Monke
     model = looked_back(cart_model())
     layout, vectors = scenes_of(model, 1, seed=4)
     scene = Scene(model.schema, layout, vectors[0])
-    monkeypatch.setattr(running, "SETTLING", 3)
+    monkeypatch.setattr(running, "REPAID", 3)
     argued: list[Scene] = []
     whole = running.Runner.argued
 
