@@ -18,28 +18,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, FIRST, LAYOUTS, SUMMABLE
+from relgym.config.constants import ALIKE, ENOUGH, FIRST, LAYOUTS, SUMMABLE
 from relgym.scene.objects import SceneLayout
 
 __all__ = ["Screen"]
 
 FACTOR = 32.0
-"""A number this much larger than what is known of its property is suspicious."""
-
-GENEROUS = 1e6
-"""In its first scenes little is known of a property: only what is this much larger than all that is known, and than 1,
-is suspicious."""
+"""A number this much larger than what is known of its property is suspicious; so of `FIRST` suspicious ones `ENOUGH`
+within this factor of one another are no errors."""
 
 SUPPORT = 5
 """So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
-one step and before the next one, don't widen the limit."""
-
-NEAR = 4.0
-"""Of `FIRST` suspicious numbers of a property `ENOUGH` within this factor of one another are no errors; nor are
-`SUPPORT` that are exactly equal: rewards, codes."""
-
-RUN = 8
-"""Nor are so many in successive transitions: another scale."""
+one step and before the next one, don't widen the limit. So many suspicious ones that are exactly equal are no errors
+(rewards, codes), nor are so many in successive transitions (another scale)."""
 
 MOST = math.sqrt(SUMMABLE)
 """Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
@@ -176,10 +167,11 @@ class Screen:
             known = self._largest[:, 0]
             some = known[known > 0.0]
             if not len(some):
-                return np.full(len(known), GENEROUS)
+                return np.full(len(known), 1.0 / ALIKE)
             most = float(some.max())
             limits = FACTOR * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
-            limits[self._scenes < ENOUGH] = GENEROUS * max(most, 1.0)
+            # Of the first scenes only that is suspicious beside which all that is known, and 1, are next to nothing.
+            limits[self._scenes < ENOUGH] = max(most, 1.0) / ALIKE
             self._limits = np.minimum(limits, MOST)
         return self._limits
 
@@ -209,8 +201,8 @@ class Screen:
             waiting.append(value)
             del waiting[:-FIRST]
             size = abs(value)
-            alike = sum(size / NEAR <= abs(other) <= size * NEAR for other in waiting)
-            if alike >= ENOUGH or waiting.count(value) >= SUPPORT or self._run[place] >= RUN:
+            alike = sum(size / FACTOR <= abs(other) <= size * FACTOR for other in waiting)
+            if alike >= ENOUGH or waiting.count(value) >= SUPPORT or self._run[place] >= SUPPORT:
                 self._largest[place] = size  # known, as if so many had come
                 self._moved()
                 del self._waiting[place], self._run[place]

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.config.constants import ENOUGH
+from relgym.config.constants import ALIKE, ENOUGH
 from relgym.model.learning.fitting import compare_and_learn
-from relgym.model.percepts.screening import FACTOR, GENEROUS, MOST, RUN, Screen
+from relgym.model.percepts.screening import FACTOR, MOST, SUPPORT, Screen
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -58,7 +58,7 @@ def test_what_grows_gradually_is_no_error() -> None:
 def test_another_scale_is_believed_after_some_steps() -> None:
     screen = accustomed()
     taken = [screen.admits(layout(), np.array([1e6 + k, 1.0]), np.array([1e6 + k, 1.0])) for k in range(20)]
-    assert taken == [False] * (RUN - 1) + [True] * (21 - RUN)
+    assert taken == [False] * (SUPPORT - 1) + [True] * (21 - SUPPORT)
     assert admits(screen, 5.0)
 
 
@@ -115,18 +115,18 @@ def limits(screen: Screen) -> list[float]:
 
 def test_limits_by_hand() -> None:
     # The fifth largest of each property counts, where a scene that stays is seen before and after its step.
-    assert limits(Screen()) == [GENEROUS] * 2
+    assert limits(Screen()) == [1.0 / ALIKE] * 2
     assert (
-        limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [GENEROUS * 2.0] * 2
+        limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [2.0 / ALIKE] * 2
     )  # 2 2 3 3 4 4: the fifth is 2
     screen = seen(*[(4.0, 0.5)] * ENOUGH)
     # The median of 4 and 0.5 is 2.25, and v is allowed as much as a property usually is.
     assert limits(screen) == [FACTOR * 4.0, FACTOR * 2.25]
     still = seen(*[(4.0, 0.0)] * ENOUGH)
     assert limits(still) == [FACTOR * 4.0] * 2  # never moved: the largest of all others stands in
-    assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [GENEROUS] * 2
+    assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [1.0 / ALIKE] * 2
     assert (
-        limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [GENEROUS] * 2
+        limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [1.0 / ALIKE] * 2
     )  # of the first scenes 1 is the least
 
 
@@ -154,9 +154,9 @@ def test_equal_numbers_are_believed_the_fifth_time_though_others_come_between() 
 def test_the_run_is_broken_by_what_is_plain() -> None:
     screen = seen(*[(4.0, 4.0)] * ENOUGH)
     taken = []
-    for k in range(3 * RUN):
+    for k in range(3 * SUPPORT):
         taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([1e4 * 5.0**k, 4.0])))
-        if k % (RUN - 1) == RUN - 2:
+        if k % (SUPPORT - 1) == SUPPORT - 2:
             assert screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0, 4.0]))
     assert not any(taken)
 
@@ -179,7 +179,7 @@ def test_another_scale_however_large_is_learned_and_saved(tmp_path: Path) -> Non
         compare_and_learn(
             model, Transition(now, scene(x + np.tanh(v / size) * size, noise)), model.predict_one(now)
         )
-    assert model.set_aside == RUN - 1
+    assert model.set_aside == SUPPORT - 1
     model.save(tmp_path / "model.relgym", history=True)
     again = WorldModel.load(tmp_path / "model.relgym")
     asked = scene(0.3e70, -0.2e70)
