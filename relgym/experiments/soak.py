@@ -18,10 +18,10 @@ import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
 from relgym.config import ModelConfig
+from relgym.config.constants import MORE_ROOM
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.criterion import measured
 from relgym.experiments.seeds import TRAINING_SEEDS
-from relgym.model.learning.forgetting import SLACK
 from relgym.model.reports.text import Cell, table
 from relgym.wrappers import ModelLearner
 
@@ -217,7 +217,9 @@ def _benchmark(world: str) -> Benchmark:
         asked = [{"world": world, "seed": seed, **size} for seed in extent.first(TRAINING_SEEDS)]
         found = known("relgym.experiments.soak:trial", asked)
         courses = [
-            told for rows in found if (told := course(rows, int(SLACK * extent["history"]))) is not None
+            told
+            for rows in found
+            if (told := course(rows, int((1.0 + MORE_ROOM) * extent["history"]))) is not None
         ]
         measures = []
         if courses:

@@ -11,16 +11,11 @@ from numpy.typing import NDArray
 
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
+from relgym.config.constants import LITTLE, MORE_ROOM
 from relgym.mixing import GOLDEN, mixed
 from relgym.model.target.property_model import PropertyModel
 
-__all__ = ["SLACK", "forget"]
-
-SLACK = 1.25
-"""The history is cut when it has grown beyond its bound by this factor, so that cutting is rare."""
-
-RARE = 20
-"""A mode that holds less than this fraction of the bound is kept whole; so is the newest noise, up to a quarter."""
+__all__ = ["forget"]
 
 
 def forget(table: ExampleTable, models: list[PropertyModel], bound: int) -> bool:
@@ -37,9 +32,9 @@ def forget(table: ExampleTable, models: list[PropertyModel], bound: int) -> bool
 
     Notes
     -----
-    Cost O(bound), once every quarter of it.
+    Cost O(bound), whenever it has grown beyond that by `MORE_ROOM`.
     """
-    if len(table) < SLACK * bound:
+    if len(table) < (1.0 + MORE_ROOM) * bound:
         return False
     forced = np.zeros(len(table), dtype=bool)
     for model in models:
@@ -55,14 +50,14 @@ def forget(table: ExampleTable, models: list[PropertyModel], bound: int) -> bool
 
 
 def _indispensable(model: PropertyModel, bound: int) -> NDArray[np.int64]:
-    """Rows of what classifiers remember, of rare modes and of recent noise."""
+    """Rows of what classifiers remember, of modes that hold little beside the bound, and of recent noise."""
     log = model.clusterer
     chosen = [
         model.classifier.exemplars.rows.astype(np.intp),
-        np.flatnonzero(log.labels == NOISE)[-bound // 4 :],
+        np.flatnonzero(log.labels == NOISE)[-bound // 4 :],  # a quarter at most
     ]
     for mode, count in zip(*np.unique(log.labels, return_counts=True), strict=True):
-        if mode != NOISE and count < bound / RARE:
+        if mode != NOISE and count < LITTLE * bound:
             chosen.append(np.flatnonzero(log.labels == mode))
     return log.rows[np.concatenate(chosen)]
 

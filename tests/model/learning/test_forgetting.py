@@ -10,8 +10,8 @@ import pytest
 from points import formulas, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
+from relgym.config.constants import MORE_ROOM
 from relgym.errors import ConfigError
-from relgym.model.learning.forgetting import SLACK
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -33,7 +33,7 @@ def old() -> WorldModel:
 
 
 def test_the_history_is_bounded(old: WorldModel) -> None:
-    assert BOUND <= old.history <= SLACK * BOUND + 100
+    assert BOUND <= old.history <= (1.0 + MORE_ROOM) * BOUND + 100
 
 
 def test_both_modes_live_on_and_count_all_they_explained(old: WorldModel) -> None:
@@ -71,7 +71,7 @@ def test_saved_and_loaded_it_goes_on_as_if_never_saved(old: WorldModel, tmp_path
         for t in bounces(150, seed=2):
             model.learn_one(t)
     assert json.dumps(again.to_json(history=True)) == json.dumps(twin.to_json(history=True))
-    assert again.history <= SLACK * BOUND + 100
+    assert again.history <= (1.0 + MORE_ROOM) * BOUND + 100
 
 
 def test_a_bound_too_small_is_refused() -> None:

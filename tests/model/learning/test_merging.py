@@ -11,8 +11,8 @@ import pytest
 from points import formulas, learned, schema_of, transitions
 
 from relgym.config import ModelConfig
+from relgym.config.constants import MORE_ROOM
 from relgym.errors import ConfigError, ModelFileError
-from relgym.model.learning.forgetting import SLACK
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Kinematics, ObjectType, Transition
 from relgym.scene.schema import SceneSchema
@@ -86,11 +86,11 @@ def test_only_models_of_one_world_and_configuration_merge(
 
 def test_memory_stays_bounded_when_two_are_put_together() -> None:
     bound = 100
-    mine, theirs = (learned(SCHEMA, steps(120, -2.0, 2.0, seed=seed), history=bound) for seed in (0, 1))
-    assert mine.history == theirs.history == 120
+    mine, theirs = (learned(SCHEMA, steps(110, -2.0, 2.0, seed=seed), history=bound) for seed in (0, 1))
+    assert mine.history == theirs.history == 110
     mine.merge(theirs)
-    assert mine.seen == 240
-    assert mine.history < SLACK * bound
+    assert mine.seen == 220
+    assert mine.history < (1.0 + MORE_ROOM) * bound
     assert formulas(mine, "v") == ["v' = v + action.a"]
     before = mine.history
     mine.learn_one(steps(1, -2.0, 2.0, seed=9)[0])
