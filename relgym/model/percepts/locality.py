@@ -8,6 +8,7 @@ small scenes have the same layout, whoever the neighbours are.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import PAIRS
 from relgym.errors import ConfigError
 from relgym.model.learning.transition import NOTHING, LearnReport, learn
 from relgym.model.parts import Parts
@@ -41,21 +43,15 @@ __all__ = [
 Ask: TypeAlias = Callable[[Scene, Callable[[Scene], Percept]], ScenePrediction | None]
 """From a scene, and what is seen of it if somebody looks, to what follows; None: arrays must say that."""
 
-MOST = 96
+MOST = math.isqrt(PAIRS)
 """Scenes of no more bodies than this are looked at as a whole."""
 
-NEAREST = 40
+NEAREST = 32
 """About so many bodies, at least one of each type, make a small scene."""
 
-MOST_MOVERS = 10_000
-"""In a scene of more types than fit into a small one: most objects that are learned of, times bodies."""
-
-LEARNED = 8
-"""Of a transition at most so many objects that changed are learned from."""
-
-SINGLY = 16
-"""Up to so many objects are predicted one by one, with all that is told of a prediction; more in one batch, in which
-roles and spreads aren't told."""
+SINGLY = PAIRS // (NEAREST * NEAREST)
+"""So many objects are looked at one by one: of a transition at most so many that changed are learned from, and up to so
+many are predicted with all that is told of a prediction; more in one batch, in which roles and spreads aren't told."""
 
 
 def large(layout: SceneLayout) -> bool:
@@ -80,10 +76,10 @@ def check_size(parts: Parts, layout: SceneLayout) -> None:
     }
     learned = able if parts.open else {t.type for t in parts.targets}
     movers = sum(t.name in learned for t in layout.types)
-    if movers * bodies > MOST_MOVERS:
+    if movers * bodies > PAIRS:
         raise ConfigError(
             f"the scene has {bodies} bodies of more than {NEAREST} types, and {movers} of them are to be learned of: "
-            f"at most {MOST_MOVERS // bodies} of so many; name the targets that matter "
+            f"at most {PAIRS // bodies} of so many; name the targets that matter "
             "(targets=['type.property', ...]), or give bodies that behave alike one type"
         )
 
@@ -282,7 +278,7 @@ def _learned(
     if not moved:
         every = able(range(len(layout.types)))
         return every[seen % len(every) :][:1] if every else []
-    return [moved[k] for k in np.unique(np.linspace(0, len(moved) - 1, LEARNED).astype(int)).tolist()]
+    return [moved[k] for k in np.unique(np.linspace(0, len(moved) - 1, SINGLY).astype(int)).tolist()]
 
 
 def predict_locally(parts: Parts, near: Neighbourhoods, scene: Scene, ask: Ask) -> ScenePrediction:

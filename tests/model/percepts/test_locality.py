@@ -102,7 +102,7 @@ def test_many_moving_bodies_are_predicted_in_one_batch_and_some_are_learned_of()
         report = model.learn_one(
             Transition(Scene(schema, layout, now.ravel()), Scene(schema, layout, then.ravel()))
         )
-        assert 0 < len(report.parts) <= locality.LEARNED
+        assert 0 < len(report.parts) <= locality.SINGLY
     said = model.predict_one(Scene(schema, layout, now.ravel()))
     assert len(said.parts) == 120
     assert np.allclose(said.scene.vector.reshape(120, 5)[:, 2], 0.5 * now[:, 2])
@@ -120,7 +120,7 @@ def test_many_kinds_of_which_all_are_learned_of_are_refused_before_anything_is_s
     values = np.stack([3.0 * np.arange(200), *np.zeros((2, 200)), *np.ones((2, 200))], axis=1)
     scene = Scene(schema, schema.layout(), values.ravel())
     model = WorldModel(schema)
-    with pytest.raises(ConfigError, match=r"200 bodies of more than 40 types, and 200 of them .* at most 50"):
+    with pytest.raises(ConfigError, match=r"200 bodies of more than 32 types, and 200 of them .* at most 50"):
         model.learn_one(Transition(scene, scene))
     some = WorldModel(schema, targets=(Target("t7", "vx"),))
     some.learn_one(Transition(scene, scene))
