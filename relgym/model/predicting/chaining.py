@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import Scale, identified, is_law, law_cells
-from relgym.config.constants import ALIKE, NEARLY_ALL
+from relgym.config.constants import ALIKE, ENOUGH, NEARLY_ALL, SEARCHED_ROWS
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
@@ -34,9 +34,6 @@ __all__ = ["CHECK_AT", "Inquiry", "Look", "due", "in_order", "inquire", "revise"
 
 CHECK_AT = (48, 192, 768, 3072)
 """Numbers of examples of a type after which the order of its targets is looked at again."""
-
-ROWS, LEAST = 300, 24
-"""At most so many examples decide, the newest; fewer than `LEAST` decide nothing."""
 
 PLANS = ((2, 5, 256), (4, 10, 128))
 """Terms, sample size and draws of the searches for such a law."""
@@ -97,7 +94,7 @@ class Inquiry:
 def inquire(parts: Parts, look: Look) -> Inquiry | None:
     """Begin to look for a law with next values of one target.
 
-    Cost of the search: at most `ROWS` rows; none where the target is explained by a law of two terms already.
+    Cost of the search: at most `SEARCHED_ROWS` rows; none where the target is explained by a law of two terms already.
     """
     type_name, prop, _ = look
     return _search(parts, parts.property_model(type_name, prop).target, look)
@@ -134,9 +131,9 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     """The search for a law with next values that describes a target better than its modes do, if it is worth while."""
     model, table = parts.models[target], parts.tables[target.type]
     clusterer = model.clusterer
-    if len(clusterer.y) < LEAST:
+    if len(clusterer.y) < ENOUGH:
         return None
-    recent = np.arange(max(0, len(clusterer.y) - ROWS), len(clusterer.y))
+    recent = np.arange(max(0, len(clusterer.y) - SEARCHED_ROWS), len(clusterer.y))
     ids = table.signature_ids[clusterer.rows[recent]]
     recent = recent[ids == ids[-1]]
     share = float((clusterer.labels[recent] != 0).mean())
