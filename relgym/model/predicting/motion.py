@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
+from relgym.config.constants import ENOUGH
 from relgym.laws.account import accounts
 from relgym.laws.book import Motion
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
@@ -24,9 +25,6 @@ from relgym.scene.objects import ACTION, Target
 from relgym.scene.schema import SceneSchema
 
 __all__ = ["Laws", "mode_bits", "possible_targets"]
-
-WEIGH_EVERY = 50
-"""Laws and modes are weighed against each other after so many transitions, and whenever the laws change."""
 
 _PREDICTED, _OUTSIDE = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.OUTSIDE)
 
@@ -119,9 +117,10 @@ class Laws:
         models: Mapping[Target, PropertyModel],
         told: ScenePrediction | None = None,
     ) -> bool:
-        """Take up one transition, then weigh laws against modes if that is due; whether laws may say something else.
+        """Take up one transition, then weigh laws against modes; whether laws may say something else.
 
-        Nobody calls it where there is nothing that moves (`LawLearner.sources`).
+        They are weighed whenever the laws change, and after every `ENOUGH` transitions. Nobody calls it where there is
+        nothing that moves (`LawLearner.sources`).
 
         What was predicted of it may be told: what came as predicted is only counted, and offered to what is kept.
         """
@@ -133,7 +132,7 @@ class Laws:
             contacts = self._contacts(percept) if motion is None or self._last is None else self._last[1]
             changed = self.learner.learn_one(contacts, percept.vectors[0], following, stays, motion)
         self._last = None  # what the laws say may have changed
-        weighed = (changed or self._seen % WEIGH_EVERY == 0) and self._weigh(models)
+        weighed = (changed or self._seen % ENOUGH == 0) and self._weigh(models)
         return changed or weighed or not known or self.learner.book.tolerance != tolerance
 
     def _confirmed(
