@@ -28,9 +28,6 @@ from relgym.scheduling.agenda import Budget
 __all__ = ["NOTHING", "LearnReport", "finish", "learn"]
 
 
-SEARCHES = 0.6
-"""Searches for modes, which may go on for ever, get this share of a step's budget; others get the rest."""
-
 NOTHING: Final[Mapping[tuple[str, str], Confirmed]] = MappingProxyType({})
 """Of a transition of which nobody looked back at what was predicted."""
 
@@ -106,7 +103,7 @@ def learn(
     idle = parts.idle
     if not idle:
         _go_on(parts, budget)
-    searches = budget.part(SEARCHES)
+    searches = _for_searches(budget)
     rows = {name: table.seen for name, table in parts.tables.items()}
     moved = False
     for type_name in parts.by_type:
@@ -156,7 +153,7 @@ def _go_on(parts: Parts, budget: Budget) -> None:
         table, model = parts.tables[target.type], parts.models[target]
         if model.fallback.guesses.underway or model.candidates.under_way:
             model.reconsider(table, budget)
-    searches = budget.part(SEARCHES)
+    searches = _for_searches(budget)
     for waiting in parts.agenda.waiting:
         if not searches.left:
             return
@@ -164,6 +161,11 @@ def _go_on(parts: Parts, budget: Budget) -> None:
             before = searches.spent
             parts.models[waiting].go_on(parts.tables[waiting.type], searches)
             parts.agenda.spent_on(waiting, searches.spent - before)
+
+
+def _for_searches(budget: Budget) -> Budget:
+    """What of a budget goes to searches for modes, which may go on for ever: half of it; others get the rest."""
+    return budget.part(0.5)
 
 
 def _inquire(parts: Parts, budget: Budget) -> None:
