@@ -17,7 +17,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from relgym.clustering.mode import NOISE
-from relgym.config.constants import FIRST, RECENT, ROUNDED, STDS
+from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
 from relgym.model.predicting.calibration import OWN, Calibration, Key
 from relgym.model.predicting.prediction import Outcome, Prediction, ScenePrediction
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from relgym.scene.objects import Target
 
 __all__ = [
-    "SHARE",
     "WRONG",
     "Confirmed",
     "Hindsight",
@@ -40,11 +39,6 @@ __all__ = [
 
 WRONG = ROUNDED
 """A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
-
-SHARE, RECOVERED = 0.15, 0.075
-"""With a larger share of the predictions wrong than the first, the clauses don't tell which mode holds; with a
-smaller one than the second they do again. In between it stays as it was: within one of Taxi's episodes a tenth is
-wrong, from one to the next a quarter."""
 
 
 class Standing(Enum):
@@ -148,8 +142,13 @@ class Hindsight:
         self._settle()
 
     def _settle(self) -> None:
+        """Clauses tell which mode holds where nearly all predictions are right, and again at half as many wrong ones.
+
+        In between it stays as it was: within one of Taxi's episodes a tenth is wrong, from one to the next a quarter.
+        """
         if len(self._steps) >= FIRST:
-            self.undecided = self.wrong > (RECOVERED if self.undecided else SHARE) * self.spoken
+            most = (1.0 - NEARLY_ALL) * self.spoken
+            self.undecided = self.wrong > (0.5 * most if self.undecided else most)
 
     def united(self, other: Hindsight) -> Hindsight:
         """What two models know together: the latest of both, in turns."""

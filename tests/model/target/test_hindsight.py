@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
-from relgym.config.constants import FIRST, RECENT
+from relgym.config.constants import FIRST, NEARLY_ALL, RECENT
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
-from relgym.model.target.hindsight import RECOVERED, SHARE, Hindsight
+from relgym.model.target.hindsight import Hindsight
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 
@@ -67,7 +67,7 @@ def test_the_latest_steps_count() -> None:
 
 
 def test_undecided_is_more_than_a_share_of_enough() -> None:
-    most = int(SHARE * 100)
+    most = int((1.0 - NEARLY_ALL) * 100)
     assert not Hindsight([(1, 1)] * (FIRST - 1)).undecided
     assert Hindsight([(1, 1)] * FIRST).undecided
     assert not Hindsight([(1, 1)] * most + [(1, 0)] * (100 - most)).undecided
@@ -76,7 +76,7 @@ def test_undecided_is_more_than_a_share_of_enough() -> None:
 
 def test_it_ends_at_half_the_share() -> None:
     known = Hindsight([(1, 1)] * 40 + [(1, 0)] * 160)
-    back = int(RECOVERED * RECENT)
+    back = int(0.5 * (1.0 - NEARLY_ALL) * RECENT)
     for _ in range(40 - back - 1):
         known.add(1, 0)
     assert (known.wrong, known.undecided) == (back + 1, True)
