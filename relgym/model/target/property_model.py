@@ -44,10 +44,6 @@ from relgym.scheduling.agenda import Budget
 
 __all__ = ["PropertyModel", "Verdict", "bodies_of"]
 
-LEFT = 0.05
-"""Where a larger share of the latest `RECENT` examples is unexplained, regressions may know better."""
-
-
 _PREDICTED, _NO_MODE, _NO_ROLES, _OUTSIDE, _UNEXPLAINED = (
     OUTCOMES.index(o)
     for o in (Outcome.PREDICTED, Outcome.NO_MODE, Outcome.NO_ROLES, Outcome.OUTSIDE, Outcome.UNEXPLAINED)
@@ -188,7 +184,7 @@ class PropertyModel:
         report = self.clusterer.learn_one(table, row, y, budget)
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
-        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT
+        self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT_OPEN
         self.calibration.accounted = self.accounted_for
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
