@@ -47,7 +47,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.config.constants import COVERED, EVIDENCE, MEMORY, SUMMABLE
+from relgym.config.constants import COVERED, EVIDENCE, MEMORY, NEARLY_ALL, SUMMABLE
 from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_WINNER
 
 __all__ = [
@@ -80,9 +80,6 @@ _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 
 FEW: Final = 32
 """In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
-
-LEAVE: Final = 1.1
-"""A law that can be claimed, and read, may leave so much more than regressions and persistence (root mean square)."""
 
 OCTAVE: Final = 4
 """Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
@@ -430,7 +427,7 @@ class _Cell:
         least = max(probability, min(other.even(), 1.0 - slips))
         if OWN in able and own is not None and own.even() >= least:
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
-            if self.left(OWN) <= LEAVE * LEAVE * least:
+            if _hardly_more(self.left(OWN), least):
                 return OWN
         return self.speaker if self.speaker in able else self.best(able)
 
@@ -1130,6 +1127,11 @@ def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, fl
     if sum(bins.values()) <= MEMORY:
         return bins
     return {k: 0.5 * v for k, v in bins.items() if v > 1.0 / MEMORY}
+
+
+def _hardly_more(squares: float, others: float) -> bool:
+    """Whether others leave as much as what is left, or nearly so (root mean square)."""
+    return squares * NEARLY_ALL * NEARLY_ALL <= others
 
 
 def _interval(bins: Mapping[int, float]) -> float:
