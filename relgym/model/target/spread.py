@@ -19,7 +19,7 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import ENOUGH, FEW_VALUES, MOST_ROWS, ROUGH, TYPICAL
-from relgym.model.target.spread_split import FACTOR, Split, find_split, place_of
+from relgym.model.target.spread_split import Split, find_split, place_of
 
 __all__ = ["Spread", "Spreads", "measure"]
 
@@ -47,10 +47,10 @@ class Spread:
     pooled: bool = False
     split: Split | None = None
 
-    def uneven(self, factor: float = FACTOR) -> bool:
-        """Whether some action scatters so many times as much as another one."""
+    def uneven(self) -> bool:
+        """Whether some action scatters more than twice as much as another one."""
         values = self.by_action.values()
-        return bool(values) and max(values) > factor * min(values)
+        return bool(values) and max(values) > 2.0 * min(values)
 
 
 class Spreads:

@@ -14,9 +14,6 @@ from relgym.config.constants import ENOUGH, EVIDENCE
 
 __all__ = ["Split", "find_split", "place_of"]
 
-FACTOR = 3.0
-"""One side's spread must be so many times as large as the other's; `ENOUGH` examples tell one."""
-
 
 @dataclass(frozen=True, slots=True)
 class Split:
@@ -75,8 +72,8 @@ def find_split(
 
     Notes
     -----
-    Cost O(d n log n). Zero is taken for a threshold where it is as good as the best but for the bits that it takes to
-    state another one.
+    Cost O(d n log n). One side's spread must be more than twice the other's, and `ENOUGH` examples tell one. Zero is
+    taken for a threshold where it is as good as the best but for the bits that it takes to state another one.
     """
     n, d = x.shape
     if n < 2 * ENOUGH or not d:
@@ -88,7 +85,7 @@ def find_split(
     above = np.maximum(np.sqrt(np.maximum(squares[-1] - squares[:-1], 0.0) / (n - count)), floor)
     whole = max(float(np.sqrt(squares[-1, 0] / n)), floor)
     gain = n * np.log2(whole) - count * np.log2(below) - (n - count) * np.log2(above)
-    apart = np.maximum(below, above) > FACTOR * np.minimum(below, above)
+    apart = np.maximum(below, above) > 2.0 * np.minimum(below, above)
     gain[(values[1:] <= values[:-1]) | (count < ENOUGH) | (n - count < ENOUGH) | ~apart] = -np.inf
     at, column = map(int, np.unravel_index(int(gain.argmax()), gain.shape))
     cost = float(np.log2(n * d))

@@ -16,8 +16,8 @@ def test_one_for_all() -> None:
 
 
 def test_much_alike_is_one_for_all() -> None:
-    assert spread_text(Spread(0.2, {LEFT: 0.1, RIGHT: 0.3}), NAMES) == "± 0.2"
-    assert spread_text(Spread(0.2, {LEFT: 0.1, RIGHT: 0.301}), NAMES) == "± 0.1 after left; ± 0.3 after right"
+    assert spread_text(Spread(0.2, {LEFT: 0.1, RIGHT: 0.2}), NAMES) == "± 0.2"
+    assert spread_text(Spread(0.2, {LEFT: 0.1, RIGHT: 0.201}), NAMES) == "± 0.1 after left; ± 0.2 after right"
 
 
 def test_too_many_to_be_told_apart() -> None:
