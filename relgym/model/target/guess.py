@@ -31,6 +31,7 @@ from relgym.config.constants import (
     OFTEN,
     RECENT,
     SEARCHED_CELLS,
+    STDS,
     SUMMABLE,
 )
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
@@ -40,13 +41,6 @@ from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["Guess", "Guesses"]
-
-SIZES = (0, 1, 2, 4, 8, 16)
-"""Numbers of terms tried; with none it is what changes in the mean."""
-
-SURE = 2.0
-"""A guess must be better than that nothing changes by so many standard errors: where a handful of examples makes most
-of the squares, it may be luck."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,12 +247,19 @@ def _choice(
 def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[int | None, float]]:
     """The smallest number of terms that predicts well what it wasn't fitted to.
 
+    Tried are none, which is what changes in the mean, and powers of two up to the square root of the number of
+    examples. It must be better than that nothing changes by `STDS` standard errors: where a handful of examples makes
+    most of the squares, it may be luck.
+
     Returns
     -------
     The number, and what it leaves of the change; None if it is no better to say that nothing changes.
     """
     n = len(change)
-    sizes = [k for k in SIZES if k < n // ALTERNATIVES]
+    sizes, size = [0], 1
+    while size * size <= n:
+        sizes.append(size)
+        size *= 2
     squares = np.empty((len(sizes), n))
     for part in np.array_split(np.arange(n), ALTERNATIVES):
         others = np.setdiff1d(np.arange(n), part)
@@ -269,7 +270,7 @@ def _terms(x: NDArray[np.float64], change: NDArray[np.float64]) -> Steps[tuple[i
             yield fitting_cells(len(others), min(k, len(order)))
         squares[:, part] = [np.square(change[part] - fit.predict(x[part])) for fit in fits]
     gain = np.square(change) - squares
-    sure = gain.mean(axis=1) > SURE * gain.std(axis=1) / np.sqrt(n)
+    sure = gain.mean(axis=1) > STDS * gain.std(axis=1) / np.sqrt(n)
     if not sure.any():
         return None, 1.0
     errors = np.where(sure, np.sqrt(squares.mean(axis=1)), np.inf)
