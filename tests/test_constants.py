@@ -20,7 +20,7 @@ MOST = {
     "hypotheses": (0, 0),
     "laws": (19, 22),
     "logic": (6, 3),
-    "model": (11, 4),
+    "model": (11, 2),
     "numeric": (5, 15),
     "scheduling": (0, 0),
 }

@@ -46,6 +46,7 @@ from relgym.model.predicting.querying import predict, predict_many
 from relgym.model.predicting.score import Score, scored
 from relgym.model.reports.advice import Advice, advices, together
 from relgym.model.reports.rules import doubted, of_laws, rule_list
+from relgym.model.reports.text import SURFACES
 from relgym.model.running.compiled import KERNEL
 from relgym.model.running.lowering import lowered
 from relgym.model.running.rolling import BatchRollout, step_by_step
@@ -776,7 +777,7 @@ class WorldModel:
         names: Mapping[str, str] | None = None,
         check: Iterable[Scene] | None = None,
         frame: str | None = None,
-        incline: float | Sequence[float] = (0.0, 90.0),
+        incline: float | Sequence[float] = SURFACES,
     ) -> str:
         """The model as text: a list of ``if / elif / else`` branches for each property, or laws of motion.
 

@@ -19,6 +19,7 @@ from relgym.clustering.mode import NOISE, sum_text
 from relgym.config.constants import NEARLY_ALL
 from relgym.model.parts import Parts
 from relgym.model.reports.distant import DistantForce, distant_forces
+from relgym.model.reports.text import percent
 from relgym.model.target.property_model import PropertyModel
 from relgym.scene.objects import ACTION, TASK
 
@@ -103,17 +104,15 @@ class Advice:
             return now
         if not self.features or (self.forces and self.remains > GOOD):
             return f"{now}; no library of features that was tried explains it"
-        close = f"comes closest, and leaves {_percent(self.remains)}"
+        close = f"comes closest, and leaves {percent(self.remains)}"
         if self.remains <= GOOD:
-            close = "explains it" + ("" if self.remains <= FINE else f" but for {_percent(self.remains)}")
+            close = "explains it" + ("" if self.remains <= FINE else f" but for {percent(self.remains)}")
         if self.remains > GOOD:
             now += "; no library of features that was tried explains it"
         return f"{now}; {remedy} {close}: {self.law}"
 
     def _now(self) -> str:
-        rough = (
-            "" if self.left >= 1.0 else f"an approximation that leaves {_percent(self.left)} of the change"
-        )
+        rough = "" if self.left >= 1.0 else f"an approximation that leaves {percent(self.left)} of the change"
         if not self.spoken:
             # Where most is left over, a function of some of the examples is no approximation of them all.
             lost = self.unexplained > MOST
@@ -286,7 +285,3 @@ def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
         part = np.flatnonzero(table.signature_ids[places] == number)
         values[part] = table.signatures[int(number)].present(table.x[places[part]], model.target)
     return values
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"

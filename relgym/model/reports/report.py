@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from relgym.classification.binary import BinaryClassifier
 from relgym.classification.role_classifier import RoleKind
 from relgym.clustering.mode import Mode
-from relgym.config.constants import ROUGH
+from relgym.config.constants import DIGITS, ROUGH
 from relgym.errors import ConfigError
 from relgym.laws.text import LawRow, WorldRow, law_rows, world_rows
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
@@ -17,7 +17,7 @@ from relgym.model.reports.advice import Advice
 from relgym.model.reports.rules import agreement
 from relgym.model.reports.spread_text import spread_text
 from relgym.model.reports.tables import ClauseRow, ModelReport, ModeRow, PairTable, RoleRow, TargetReport
-from relgym.model.reports.text import Cell, as_relations, table
+from relgym.model.reports.text import SURFACES, Cell, as_relations, percent, table
 from relgym.reporting.naming import named_text
 from relgym.reporting.parser import parse_rules
 from relgym.reporting.rules import RuleList
@@ -44,7 +44,7 @@ _ELSE = "else"
 _PREDICTED = OUTCOMES.index(Outcome.PREDICTED)
 
 
-def report(model: WorldModel, *, digits: int = 7) -> ModelReport:
+def report(model: WorldModel, *, digits: int = DIGITS) -> ModelReport:
     """Modes, clauses and roles of every target as records, for programs.
 
     Parameters
@@ -72,11 +72,11 @@ def describe(
     model: WorldModel,
     *,
     details: bool = False,
-    digits: int = 7,
+    digits: int = DIGITS,
     names: Mapping[str, str] | None = None,
     check: Iterable[Scene] | None = None,
     frame: str | None = None,
-    incline: float | Sequence[float] = (0.0, 90.0),
+    incline: float | Sequence[float] = SURFACES,
 ) -> str:
     """A model as text, for people: its rules, or the tables behind them.
 
@@ -125,7 +125,7 @@ def describe(
 
 def checked_rules(
     model: WorldModel,
-    digits: int = 7,
+    digits: int = DIGITS,
     names: Mapping[str, str] | None = None,
     check: Iterable[Scene] | None = None,
 ) -> RuleList:
@@ -177,7 +177,7 @@ def _record(part: PropertyModel) -> str:
     share = 100.0 * sure / trials if trials else 0.0
     return (
         f"{share:.3g} % of what modes predicted lately is of a kind that is claimed; "
-        f"{100.0 * known.slips:.2g} % of all was claimed and off by more than a claim may be"
+        f"{percent(known.slips)} of all was claimed and off by more than a claim may be"
     )
 
 

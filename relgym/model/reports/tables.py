@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from relgym.html import html_text
 from relgym.laws.text import LEGEND, LawRow
 from relgym.model.reports.advice import Advice
-from relgym.model.reports.text import Cell, amount, indented, table, wrapped
+from relgym.model.reports.text import Cell, amount, indented, percent, table, wrapped
 
 __all__ = ["ClauseRow", "ModeRow", "ModelReport", "PairTable", "RoleRow", "TargetReport"]
 
@@ -203,7 +203,7 @@ class ModelReport:
 def _mode_table(target: TargetReport) -> str:
     noise = "noise"
     if target.noise:
-        noise += f": no mode explains these {100.0 * target.noise / target.examples:.2g} %"
+        noise += f": no mode explains these {percent(target.noise / target.examples)}"
     rows: list[list[Cell]] = [[0, target.noise, noise]]
     for m in target.modes:
         first, *rest = wrapped(m.function, _FUNCTION_WIDTH, "+-")

@@ -6,12 +6,15 @@ import dataclasses
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
-__all__ = ["Cell", "amount", "as_relations", "indented", "plain", "table", "wrapped"]
+__all__ = ["SURFACES", "Cell", "amount", "as_relations", "indented", "percent", "plain", "table", "wrapped"]
 
 Cell: TypeAlias = str | int | float
 """Integers get thousands separators, floats six significant digits."""
+
+SURFACES: Final = (0.0, 90.0)
+"""Angles of the surfaces of which functions along the world's axes are told, in degrees: floors and walls."""
 
 _GAP = "  "
 _HALF = re.compile(r"(?<![\w.])(?<!- )(?P<name>[\w.]+) (?P<sign>>|<=) 0\.5(?![\d.e])")
@@ -100,6 +103,11 @@ def wrapped(text: str, width: int, signs: str) -> list[str]:
 def amount(count: int, noun: str) -> str:
     """Such as ``1 mode`` and ``16,000 examples``."""
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
+def percent(share: float) -> str:
+    """Such as ``12 %`` and ``0.5 %``."""
+    return f"{100.0 * share:.2g} %"
 
 
 def plain(value: Any) -> Any:

@@ -34,6 +34,7 @@ from relgym.config.constants import (
     STDS,
     SUMMABLE,
 )
+from relgym.model.reports.text import percent
 from relgym.model.target.scope import Scope, alike, alike_to, spread_out
 from relgym.numeric.stepwise import LinearFit, fitting_cells, forward_order, least_squares
 from relgym.scene.objects import Target
@@ -60,8 +61,7 @@ class Guess:
 
     def text(self, digits: int) -> str:
         """For people."""
-        share = f"{100.0 * self.left:.2g} %"
-        return f"best guess, no law: {self.mode.formula(digits)}, which leaves {share} of the change"
+        return f"best guess, no law: {self.mode.formula(digits)}, which leaves {percent(self.left)} of the change"
 
 
 class Guesses:
