@@ -427,7 +427,7 @@ class _Cell:
         least = max(probability, min(other.even(), 1.0 - slips))
         if OWN in able and own is not None and own.even() >= least:
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
-            if _hardly_more(self.left(OWN), least):
+            if self.left(OWN) * NEARLY_ALL * NEARLY_ALL <= least:  # squares: in root mean square a tenth more
                 return OWN
         return self.speaker if self.speaker in able else self.best(able)
 
@@ -1127,11 +1127,6 @@ def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, fl
     if sum(bins.values()) <= MEMORY:
         return bins
     return {k: 0.5 * v for k, v in bins.items() if v > 1.0 / MEMORY}
-
-
-def _hardly_more(squares: float, others: float) -> bool:
-    """Whether others leave as much as what is left, or nearly so (root mean square)."""
-    return squares * NEARLY_ALL * NEARLY_ALL <= others
 
 
 def _interval(bins: Mapping[int, float]) -> float:
