@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.mode import Mode
-from relgym.config import ModelConfig
 from relgym.experiments.analytic import AnalyticMode, AnalyticModes, Case
+from relgym.experiments.benchmark import Shown
 from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
@@ -23,7 +23,7 @@ from relgym.experiments.rollouts import RolloutErrors, rollouts
 from relgym.experiments.worlds.online import learned
 from relgym.model.world_model import WorldModel
 
-__all__ = ["AXES", "Outcome", "TargetOutcome", "accuracy", "ball_measures", "matched"]
+__all__ = ["AXES", "TargetOutcome", "ball"]
 
 AXES: Final = {"x": "ball.vx", "y": "ball.vy"}
 
@@ -65,6 +65,9 @@ _CLASSES: Final[Mapping[int, Sequence[tuple[str, str, _Kind, float]]]] = {
 _WRONG: Final = {1: 0.0005, 2: 0.001, 3: 0.002}
 _FAILED: Final = {1: 3, 2: 10}
 
+TRIALS: Final = 80
+"""Episodes of a test set that are rolled out."""
+
 
 @dataclass(frozen=True, slots=True)
 class TargetOutcome:
@@ -88,87 +91,55 @@ class TargetOutcome:
     noise: float
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one training seed: one-step errors and roll-outs by test seed, modes by axis."""
-
-    seed: int
-    evaluations: Mapping[int, Evaluation]
-    rolled: Mapping[int, RolloutErrors]
-    targets: Mapping[str, TargetOutcome]
-
-
-def accuracy(
-    experiment: int,
-    *,
-    training: Iterable[int],
-    tests: Sequence[int],
-    config: ModelConfig | None = None,
-    episodes: int | None = None,
-    test_episodes: int | None = None,
-    trials: int = 80,
-) -> Iterator[Outcome]:
-    """Train on each training seed, test on each test seed; outcomes as they come.
-
-    Parameters
-    ----------
-    experiment
-        1, 2 or 3.
-    training, tests
-        Seeds.
-    config
-        Free parameters of the model.
-    episodes, test_episodes
-        How many episodes to train and to test on; default: as many as in the thesis.
-    trials
-        How many episodes of a test set are rolled out; 0: none.
-    """
+def ball(experiment: int, training: Sequence[int], tests: Sequence[int]) -> Shown:
+    """Train on each training seed, test on each test seed: figures beside their limits, and what is wrong of each."""
     laws = BALL_EXPERIMENTS[experiment].modes()
+    evaluations: list[Evaluation] = []
+    rolled: list[RolloutErrors] = []
+    targets: dict[str, list[TargetOutcome]] = {axis: [] for axis in AXES}
+    notes: list[str] = []
     for seed in training:
-        taught = list(ball_episodes(experiment, seed=seed, episodes=episodes))
-        model = learned(taught, config=config)
-        evaluations, rolled = {}, {}
+        taught = list(ball_episodes(experiment, seed=seed))
+        model = learned(taught)
+        notes.append(f"training seed {seed}:")
+        for axis, found in targets.items():
+            known = _target_outcome(model, axis, _of(laws, axis), taught)
+            found.append(known)
+            notes.append(f"  {axis}: {len(known.stated)} analytic modes, noise {known.noise:.3%}")
+            notes += [f"     missing:  {name}" for name in known.missing]
+            notes += [f"     spurious: {formula}" for formula in known.spurious]
         for test in tests:
-            fresh = list(ball_episodes(experiment, seed=test, episodes=test_episodes, test=True))
-            evaluations[test] = evaluate(model, fresh, laws)
-            if trials:
-                rolled[test] = rollouts(model, fresh[:trials])
-        targets = {axis: _target_outcome(model, axis, _of(laws, axis), taught) for axis in AXES}
-        yield Outcome(seed, evaluations, rolled, targets)
-
-
-def matched(mode: Mode, laws: Sequence[AnalyticMode]) -> int | None:
-    """Number of the analytic mode that a learned mode states to 1e-9; none if it is no such."""
-    weights = dict(mode.roles[0].terms)
-    if any(role.terms for role in mode.open_roles) or not weights.keys() <= {"vx", "vy"}:
-        return None
-    stated = np.array([weights.get("vx", 0.0), weights.get("vy", 0.0), mode.intercept])
-    off = [np.abs(stated - [*law.weights, law.intercept]).max() for law in laws]
-    best = int(np.argmin(off))
-    return best if off[best] <= _SAME else None
-
-
-def ball_measures(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
-    """The figures of one ball experiment beside their limits, over all pairs of seeds."""
-    laws = BALL_EXPERIMENTS[experiment].modes()
-    evaluations = [e for outcome in outcomes for e in outcome.evaluations.values()]
-    found = [
+            fresh = list(ball_episodes(experiment, seed=test, test=True))
+            evaluations.append(evaluate(model, fresh, laws))
+            rolled.append(rollouts(model, fresh[:TRIALS]))
+            notes += _lines(test, evaluations[-1], rolled[-1])
+    measures = [
         measured(f"wrong, {axis}", _WRONG[experiment], [e[target].total.rate for e in evaluations])
         for axis, target in AXES.items()
     ]
     for name, axis, kind, limit in _CLASSES[experiment]:
         rates = [_rate(e, axis, laws, kind) for e in evaluations]
-        found.append(measured(f"wrong, {name}, {axis}", limit, rates))
-    found += _mode_measures(experiment, outcomes)
-    rolled = [r for outcome in outcomes for r in outcome.rolled.values()]
+        measures.append(measured(f"wrong, {name}, {axis}", limit, rates))
+    measures += _mode_measures(experiment, targets)
     if rolled and experiment in _FAILED:
         failed = [r.failed_without_corner for r in rolled]
-        found.append(measured("roll-outs failed without a corner", _FAILED[experiment], failed))
-    return found
+        measures.append(measured("roll-outs failed without a corner", _FAILED[experiment], failed))
+    return Shown(measures, notes)
 
 
-def _mode_measures(experiment: int, outcomes: Sequence[Outcome]) -> list[Measure]:
-    targets = {axis: [outcome.targets[axis] for outcome in outcomes] for axis in AXES}
+def _lines(test: int, evaluation: Evaluation, rolled: RolloutErrors) -> Iterator[str]:
+    """What is wrong with a test seed."""
+    for axis, target in AXES.items():
+        errors = evaluation[target]
+        bad = ", ".join(f"{m.name} {m.wrong}/{m.examples}" for m in errors.modes if m.wrong)
+        yield f"  test {test} {axis}: wrong {errors.total.rate:.4%} ({bad}); left out {errors.left_out}"
+    yield (
+        f"  test {test} roll-outs: {rolled.failed} of {rolled.trials} failed, {rolled.failed_without_corner} "
+        f"without a corner, {rolled.stopped} stopped early; median error {rolled.median:.1e}"
+    )
+
+
+def _mode_measures(experiment: int, targets: Mapping[str, Sequence[TargetOutcome]]) -> list[Measure]:
     if experiment == 2:
         sliding = _sliding(BALL_EXPERIMENTS[2].modes().x)
         x = [len(set(t.stated) - sliding) for t in targets["x"]]
@@ -200,11 +171,22 @@ def _of(laws: AnalyticModes, axis: str) -> tuple[AnalyticMode, ...]:
     return laws.x if axis == "x" else laws.y
 
 
+def _matched(mode: Mode, laws: Sequence[AnalyticMode]) -> int | None:
+    """Number of the analytic mode that a learned mode states to 1e-9; none if it is no such."""
+    weights = dict(mode.roles[0].terms)
+    if any(role.terms for role in mode.open_roles) or not weights.keys() <= {"vx", "vy"}:
+        return None
+    stated = np.array([weights.get("vx", 0.0), weights.get("vy", 0.0), mode.intercept])
+    off = [np.abs(stated - [*law.weights, law.intercept]).max() for law in laws]
+    best = int(np.argmin(off))
+    return best if off[best] <= _SAME else None
+
+
 def _target_outcome(
     model: WorldModel, axis: str, laws: Sequence[AnalyticMode], episodes: Sequence[Episode]
 ) -> TargetOutcome:
     part = model.property_model(*AXES[axis].split("."))
-    found = {mode: matched(mode, laws) for mode in part.modes}
+    found = {mode: _matched(mode, laws) for mode in part.modes}
     stated = tuple(sorted({k for k in found.values() if k is not None}))
     true = np.concatenate([episode.truth.mode[AXES[axis]] for episode in episodes])
     missing = _missing(stated, laws, true, _velocities(episodes))

@@ -4,107 +4,85 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
-from relgym.config import ModelConfig
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.benchmark import Shown
+from relgym.experiments.criterion import measured
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.evaluate import evaluate
 from relgym.experiments.worlds.accuracy import AXES
-from relgym.experiments.worlds.online import Course, follow, last
+from relgym.experiments.worlds.online import follow, last
 from relgym.model.world_model import WorldModel
 
-__all__ = ["KindsOutcome", "box_then_ramp", "prequential_measures", "same_model", "stream_measures"]
+__all__ = ["later_episodes", "prequential"]
 
 EARLY, LATE = 3, 32
-"""Episodes from which on the two limits of `prequential_measures` hold; the first episode is 1."""
+"""Episodes from which on the two limits of `prequential` hold; the first episode is 1."""
+
+FIRST, EVERY = 8, 16
+"""Episodes after which a model must be the same, and those that another one has seen in all."""
+
+EPISODES = 40
+"""Episodes of either kind of room that are learned from, and tested on."""
 
 
-def prequential_measures(courses: Iterable[Course]) -> list[Measure]:
+def prequential(training: Sequence[int], _: Sequence[int]) -> Shown:
     """Share of wrong predictions from episode 3 and from episode 32 on; the worse of both coordinates."""
-    runs = list(courses)
-    found = []
+    laws = BALL_EXPERIMENTS[1].modes()
+    courses = [last(follow(ball_episodes(1, seed=seed), laws=laws)) for seed in training]
+    measures = []
     for first, limit in ((EARLY, 0.02), (LATE, 0.003)):
-        rates = [max(run.rate(target, first) for target in AXES.values()) for run in runs]
-        found.append(measured(f"wrong from episode {first} on", limit, rates))
-    return found
+        rates = [max(course.rate(target, first) for target in AXES.values()) for course in courses]
+        measures.append(measured(f"wrong from episode {first} on", limit, rates))
+    return Shown(measures)
 
 
-def same_model(episodes: Iterable[Episode], after: int, *, config: ModelConfig | None = None) -> bool:
+def later_episodes(training: Sequence[int], tests: Sequence[int]) -> Shown:
+    """Whether a model is the same if more episodes follow, and what scenes of another kind change of what it says."""
+    same = [_same_model(seed) for seed in training]
+    kinds = [_box_then_ramp(seed, tests[0]) for seed in training]
+    # By how much the share of wrong predictions grew, in the worse coordinate.
+    worse = [max(after[axis] - before[axis] for axis in before) for before, after in kinds]
+    measures = [
+        measured("models equal byte for byte", 1.0, map(float, same), ">="),
+        measured("more wrong on box-only scenes", 0.0, worse),
+    ]
+    notes = [f"box-only scenes wrong before {before}, after {after}" for before, after in kinds]
+    return Shown(measures, notes)
+
+
+def _same_model(seed: int) -> bool:
     """Whether the model after some episodes is, byte for byte, the same if more follow.
 
     One model sees the first episodes only. The other one sees all, and a copy is taken on the way.
-
-    Parameters
-    ----------
-    episodes
-        More than `after` episodes.
-    after
-        After how many episodes to compare.
-    config
-        Free parameters of the model.
     """
-    every = list(episodes)
-    alone = last(follow(every[:after], config=config))
+    every = list(ball_episodes(1, seed=seed, episodes=EVERY))
+    alone = last(follow(every[:FIRST]))
     taken = ""
-    for k, course in enumerate(follow(every, config=config), start=1):
-        if k == after:
+    for k, course in enumerate(follow(every), start=1):
+        if k == FIRST:
             taken = _written(copy.deepcopy(course.model))
     return _written(alone.model) == taken
 
 
-@dataclass(frozen=True, slots=True)
-class KindsOutcome:
+def _box_then_ramp(seed: int, test: int) -> list[dict[str, float]]:
     """Wrong predictions on fresh scenes with a box, before and after scenes with a ramp were learned, by axis."""
-
-    before: dict[str, float]
-    after: dict[str, float]
-
-    @property
-    def worsening(self) -> float:
-        """By how much the share of wrong predictions grew, in the worse coordinate."""
-        return max(self.after[axis] - self.before[axis] for axis in self.before)
-
-
-def box_then_ramp(*, seed: int, test: int, episodes: int = 40, test_episodes: int = 40) -> KindsOutcome:
-    """Learn scenes with a box only, then with a ramp only, and test on the former before and after.
-
-    Parameters
-    ----------
-    seed, test
-        Seeds of training and test scenes.
-    episodes, test_episodes
-        How many episodes of either kind to learn from, and how many to test on.
-    """
     setting = BALL_EXPERIMENTS[1]
     laws, whole = setting.modes(), next(ball_episodes(1, seed=seed)).schema
 
-    def only(kind: str, number: int, count: int, *, fresh: bool = False) -> list[Episode]:
-        rooms = ball_episodes(replace(setting, objects=(kind,)), seed=number, episodes=count, test=fresh)
+    def only(kind: str, number: int, *, fresh: bool = False) -> list[Episode]:
+        rooms = ball_episodes(replace(setting, objects=(kind,)), seed=number, episodes=EPISODES, test=fresh)
         return [replace(room, schema=whole, layout=whole.layout(room.layout.names)) for room in rooms]
 
-    box, ramp = only("box", seed, episodes), only("ramp", seed, episodes)
-    tested = only("box", test, test_episodes, fresh=True)
-
-    def wrong(model: WorldModel) -> dict[str, float]:
-        found = evaluate(model, tested, laws)
-        return {axis: found[target].total.rate for axis, target in AXES.items()}
-
+    box, ramp, tested = only("box", seed), only("ramp", seed), only("box", test, fresh=True)
     rates = []
     for k, course in enumerate(follow([*box, *ramp]), start=1):
         if k in (len(box), len(box) + len(ramp)):
-            rates.append(wrong(course.model))
-    return KindsOutcome(*rates)
-
-
-def stream_measures(same: Iterable[bool], kinds: Iterable[KindsOutcome]) -> list[Measure]:
-    """One figure per run."""
-    return [
-        measured("models equal byte for byte", 1.0, map(float, same), ">="),
-        measured("more wrong on box-only scenes", 0.0, [each.worsening for each in kinds]),
-    ]
+            found = evaluate(course.model, tested, laws)
+            rates.append({axis: found[target].total.rate for axis, target in AXES.items()})
+    return rates
 
 
 def _written(model: WorldModel) -> str:
