@@ -7,11 +7,17 @@ from argparse import ArgumentTypeError
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from relgym.model.reports.text import Cell, table
 
-__all__ = ["Criterion", "Measure", "measured", "one_of", "report"]
+__all__ = ["Criterion", "Figure", "Measure", "Side", "gathered", "measured", "one_of", "report"]
+
+Side: TypeAlias = Literal["<=", ">="]
+"""Whether a figure may be at most or must be at least its limit."""
+
+Figure: TypeAlias = tuple[str, float, float, Side]
+"""What is measured once: of what, with its unit; the limit; the figure; the limit's side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +36,7 @@ class Criterion:
 
     what: str
     limit: float
-    side: Literal["<=", ">="] = "<="
+    side: Side = "<="
 
     def met(self, value: float) -> bool:
         """Whether a figure keeps the limit; NaN never does."""
@@ -84,9 +90,17 @@ def _plain(value: float) -> float | str:
     return value if math.isfinite(value) else str(value)
 
 
-def measured(what: str, limit: float, values: Iterable[float], side: Literal["<=", ">="] = "<=") -> Measure:
+def measured(what: str, limit: float, values: Iterable[float], side: Side = "<=") -> Measure:
     """A criterion and its figures in one call."""
     return Measure(Criterion(what, limit, side), tuple(map(float, values)))
+
+
+def gathered(figures: Iterable[Figure]) -> list[Measure]:
+    """Figures that come one by one, those of the same thing together; in the order in which each comes first."""
+    found: dict[Criterion, list[float]] = {}
+    for what, limit, value, side in figures:
+        found.setdefault(Criterion(what, limit, side), []).append(float(value))
+    return [Measure(criterion, tuple(values)) for criterion, values in found.items()]
 
 
 def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -> str:

@@ -34,6 +34,7 @@ __all__ = [
     "racing",
     "recommended",
     "regular",
+    "size",
     "stream",
     "view_of",
 ]
@@ -269,6 +270,15 @@ def nrmse_d(model: WorldModel, lesson: Lesson, keep: NDArray[np.bool_] | None = 
     for k, name in enumerate(lesson.view.schema.type_of("self").properties):
         spread = float(change[keep, k].std()) or float(change[:, k].std()) or 1.0
         found[name] = float(np.sqrt(np.square(error[keep, k]).mean())) / spread
+    return found
+
+
+def size(
+    error: NDArray[np.float64], change: NDArray[np.float64], keep: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """nRMSE-d on some rows: root mean square error over the change's standard deviation there, shape ``(d,)``."""
+    spread = np.maximum(change[keep].std(axis=0), 1e-12)
+    found: NDArray[np.float64] = np.sqrt(np.square(error[keep]).mean(axis=0)) / spread
     return found
 
 

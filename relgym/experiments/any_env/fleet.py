@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from typing import Any, Final
 
@@ -22,7 +22,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from relgym.config import ModelConfig
 from relgym.envs.views import NumbersView
 from relgym.experiments.any_env.data import STUDIES, Study, made, pumping, view_of
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.criterion import Figure
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 from relgym.wrappers import VectorModelLearner
@@ -72,23 +72,17 @@ class Diary(gym.Wrapper[Any, Any, Any, Any]):
         return (observation, *rest)
 
 
-def fleet(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
+def fleet(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> Iterator[Figure]:
     """Fleets in every autoreset mode against one env, and an agent's speed with the callback against without."""
-    found: dict[tuple[str, float, bool], list[float]] = {}
     for name in list(FEATURES)[: 1 if quick else None]:
         for mode in AutoresetMode:
             for training, _ in seeds:
-                for key, value in taught(name, mode, training, 60 if quick else STEPS).items():
-                    found.setdefault(key, []).append(value)
-    measures = [
-        measured(what, limit, v, ">=" if least else "<=") for (what, limit, least), v in found.items()
-    ]
+                yield from taught(name, mode, training, 60 if quick else STEPS)
     if find_spec("stable_baselines3") is not None and not quick:
-        measures += policy_speed(POLICY_STEPS, REPEATS)
-    return measures
+        yield from policy_speed(POLICY_STEPS, REPEATS)
 
 
-def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> dict[tuple[str, float, bool], float]:
+def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> Iterator[Figure]:
     """What a fleet of `ENVS` teaches in one autoreset mode, beside what its envs' diaries teach one by one."""
     study, entries = STUDIES[name], list[Entry]()
     view, config = view_of(study), ModelConfig(features=FEATURES[name])
@@ -112,10 +106,8 @@ def taught(name: str, mode: AutoresetMode, seed: int, steps: int) -> dict[tuple[
     print(
         f"  fooled by leaps: {_unexplained(fooled):.2g} of x unexplained, against {_unexplained(learner.model):.2g}"
     )
-    return {
-        (f"{where}: transitions learned that no env made, or the other way round", 0.0, False): foreign,
-        (f"{where}: model equal to that of a single env", 1.0, True): float(same),
-    }
+    yield f"{where}: transitions learned that no env made, or the other way round", 0.0, foreign, "<="
+    yield f"{where}: model equal to that of a single env", 1.0, float(same), ">="
 
 
 def _sailed(
@@ -168,7 +160,7 @@ def _unexplained(model: WorldModel) -> float:
     return part.noise_examples / max(part.seen, 1)
 
 
-def policy_speed(steps: int, repeats: int) -> list[Measure]:
+def policy_speed(steps: int, repeats: int) -> Iterator[Figure]:
     """How fast PPO trains with the callback (learning in a process of its own), over its speed without.
 
     So many trainings of each kind, in turns; one torch thread; those of the first turn are short and don't count. The
@@ -186,15 +178,13 @@ def policy_speed(steps: int, repeats: int) -> list[Measure]:
     for kind, times in kinds.items():
         wall, own = np.median(times, axis=0)
         print(f"PPO, {steps:,} steps, {kind}: {wall:.1f} s, of which the agent's process works {own:.1f} s")
-
-    def ratios(reference: str, clock: int) -> list[float]:
-        return [r[clock] / w[clock] for r, w in zip(kinds[reference], kinds["watched"], strict=True)]
-
-    return [
-        measured("PPO's speed with the callback, over that without", 0.8, ratios("bare", 0), ">="),
-        measured("... by processor time of the agent's process", 0.8, ratios("bare", 1), ">="),
-        measured("... by the clock, beside a process that counts", 0.8, ratios("beside a counter", 0), ">="),
-    ]
+    for what, reference, clock in (
+        ("PPO's speed with the callback, over that without", "bare", 0),
+        ("... by processor time of the agent's process", "bare", 1),
+        ("... by the clock, beside a process that counts", "beside a counter", 0),
+    ):
+        for other, watched in zip(kinds[reference], kinds["watched"], strict=True):
+            yield what, 0.8, other[clock] / watched[clock], ">="
 
 
 def _trained(steps: int, kind: str) -> tuple[float, float]:

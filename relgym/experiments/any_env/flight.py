@@ -14,7 +14,7 @@ second step after the last touch on.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import Final
 
@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from relgym.baselines.base import Regressor
 from relgym.config import ModelConfig
-from relgym.experiments.any_env.data import STUDIES, Lesson, collect, errors, learned, recommended
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.any_env.data import STUDIES, Lesson, collect, errors, learned, recommended, size
+from relgym.experiments.criterion import Figure
 from relgym.model.world_model import WorldModel
 
 __all__ = ["agreement", "flight", "flying", "settled"]
@@ -56,16 +56,13 @@ def settled(lesson: Lesson) -> NDArray[np.bool_]:
     return found
 
 
-def flight(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
+def flight(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> Iterator[Figure]:
     """Errors in flight by property, of the model, of least squares and of nets; modes against leg flags."""
-    found: dict[tuple[str, float, bool], list[float]] = {}
     for number, (training, test) in enumerate(seeds):
         lesson = collect(STUDIES["lander"], 600 if quick else TRAIN, training)
         fresh = collect(STUDIES["lander"], 500 if quick else TEST, 2_000 + test)
         model = _model(lesson, verbose=not number, quick=quick)
-        for key, value in _compared(model, lesson, fresh, nets=not quick).items():
-            found.setdefault(key, []).append(value)
-    return [measured(what, limit, v, ">=" if least else "<=") for (what, limit, least), v in found.items()]
+        yield from _compared(model, lesson, fresh, nets=not quick)
 
 
 def _model(lesson: Lesson, *, verbose: bool, quick: bool) -> WorldModel:
@@ -81,31 +78,28 @@ def _model(lesson: Lesson, *, verbose: bool, quick: bool) -> WorldModel:
     return model
 
 
-def _compared(
-    model: WorldModel, lesson: Lesson, fresh: Lesson, *, nets: bool
-) -> dict[tuple[str, float, bool], float]:
+def _compared(model: WorldModel, lesson: Lesson, fresh: Lesson, *, nets: bool) -> Iterator[Figure]:
     names = lesson.view.schema.type_of("self").properties
-    flies, calm = flying(fresh), settled(fresh)
+    flies, calm, change = flying(fresh), settled(fresh), fresh.change
 
-    def size(error: NDArray[np.float64], rows: NDArray[np.bool_] = flies) -> dict[str, float]:
-        spread = np.maximum(fresh.change[rows].std(axis=0), 1e-12)
-        return dict(zip(names, np.sqrt(np.square(error[rows]).mean(axis=0)) / spread, strict=True))
+    def sizes(error: NDArray[np.float64], rows: NDArray[np.bool_] = flies) -> dict[str, float]:
+        return dict(zip(names, size(error, change, rows), strict=True))
 
     missed = errors(model, fresh)
-    own, floor = size(missed), size(_least_squares(lesson, fresh) - fresh.change)
-    found = {(f"{p}, flight", 1.1 * limit, False): own[p] for p, limit in FLOOR.items()}
-    found[("w, flight", SPIN, False)] = own["w"]
-    hindsight = size(_least_squares(fresh, fresh) - fresh.change)["w"]
-    found[("w, what least squares fitted in hindsight leave in flight", SPIN, False)] = hindsight
-    found[("w, settled flight", SPIN, False)] = size(missed, calm)["w"]
+    own, floor = sizes(missed), sizes(_least_squares(lesson, fresh) - change)
+    for p, limit in FLOOR.items():
+        yield f"{p}, flight", 1.1 * limit, own[p], "<="
+    yield "w, flight", SPIN, own["w"], "<="
+    hindsight = sizes(_least_squares(fresh, fresh) - change)["w"]
+    yield "w, what least squares fitted in hindsight leave in flight", SPIN, hindsight, "<="
+    yield "w, settled flight", SPIN, sizes(missed, calm)["w"], "<="
     for p in (*FLOOR, "w"):
-        found[(f"{p}, over least squares on the law's features", 1.1, False)] = own[p] / floor[p]
+        yield f"{p}, over least squares on the law's features", 1.1, own[p] / floor[p], "<="
     if nets and find_spec("torch") is not None:
-        baseline = size(_nets(lesson, fresh) - fresh.change)
+        baseline = sizes(_nets(lesson, fresh) - change)
         for p in ("px", "py", "vx", "vy", "th", "w"):
-            found[(f"{p}, over an MLP ensemble", 1.0, False)] = own[p] / baseline[p]
-    found[("vx: law or not, agreement with the leg flags", 0.95, True)] = agreement(model, lesson)
-    return found
+            yield f"{p}, over an MLP ensemble", 1.0, own[p] / baseline[p], "<="
+    yield "vx: law or not, agreement with the leg flags", 0.95, agreement(model, lesson), ">="
 
 
 def agreement(model: WorldModel, lesson: Lesson) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from relgym.config import ModelConfig
 from relgym.experiments.any_env.data import STUDIES, collect, nrmse_d, stream, view_of
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.criterion import Figure
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.evaluate import evaluate
 from relgym.experiments.worlds.accuracy import AXES
@@ -50,7 +50,7 @@ class Life:
     """
 
     transitions: Callable[[int], Iterator[Transition]]
-    evaluated: Callable[[WorldModel, int], list[Measure]]
+    evaluated: Callable[[WorldModel, int], Iterator[Figure]]
     frames: Literal["auto", "world"] = "auto"
 
 
@@ -59,9 +59,10 @@ def _carts(seed: int) -> Iterator[Transition]:
     return (step.transition for step in stream(study, view_of(study), seed))
 
 
-def _cart_evaluated(model: WorldModel, test: int) -> list[Measure]:
+def _cart_evaluated(model: WorldModel, test: int) -> Iterator[Figure]:
     error = nrmse_d(model, collect(STUDIES["cart"], 1_000, 2_000 + test))
-    return [measured(f"{prop}, still right", 1e-3, [error[prop]]) for prop in ("x", "th")]
+    for prop in ("x", "th"):
+        yield f"{prop}, still right", 1e-3, error[prop], "<="
 
 
 def _balls(seed: int) -> Iterator[Transition]:
@@ -70,10 +71,11 @@ def _balls(seed: int) -> Iterator[Transition]:
             yield from episode.transitions()
 
 
-def _ball_evaluated(model: WorldModel, test: int) -> list[Measure]:
+def _ball_evaluated(model: WorldModel, test: int) -> Iterator[Figure]:
     fresh = list(ball_episodes(EXPERIMENT, seed=test, episodes=TEST_EPISODES, test=True))
     found = evaluate(model, fresh, BALL_EXPERIMENTS[EXPERIMENT].modes())
-    return [measured(f"{axis}, wrong predictions", 0.001, [found[t].total.rate]) for axis, t in AXES.items()]
+    for axis, target in AXES.items():
+        yield f"{axis}, wrong predictions", 0.001, found[target].total.rate, "<="
 
 
 LIVES: Final = {
@@ -91,7 +93,7 @@ def memory(
     quick: bool = False,
     steps: int | None = None,
     bound: int | None = None,
-) -> list[Measure]:
+) -> Iterator[Figure]:
     """A stream of fresh transitions, of the first seed; `steps` of which `bound` are kept.
 
     The cost of the last steps is compared with that of a second model's at the beginning of the same stream, in turns:
@@ -121,12 +123,10 @@ def memory(
     tenths = ", ".join(f"{1e3 * np.median(part):.3g}" for part in np.array_split(old.costs, 10))
     print(f"median by tenths: {tenths} ms; worst step {1e3 * old.costs.max():.3g} ms")
     print(f"peak memory {peaks[-1] / 1024:.0f} MiB\n{old.model.describe(digits=5)}")
-    return [
-        measured("median cost of a step at the end, over that at 10,000", 1.2, [late / early]),
-        measured("most rows kept, over the bound", 1.3, [max(rows) / bound]),
-        measured("peak memory at the end, over that at 1.5 bounds", 1.05, [peaks[-1] / peaks[0]]),
-        *life.evaluated(old.model, test),
-    ]
+    yield "median cost of a step at the end, over that at 10,000", 1.2, late / early, "<="
+    yield "most rows kept, over the bound", 1.3, max(rows) / bound, "<="
+    yield "peak memory at the end, over that at 1.5 bounds", 1.05, peaks[-1] / peaks[0], "<="
+    yield from life.evaluated(old.model, test)
 
 
 class _Living:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.any_env.recorded import live, stream
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.criterion import Figure
 from relgym.experiments.recording import Recording
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
@@ -39,7 +39,7 @@ STREAM: Final = 5_000
 _TARGETS: Final = (Target("ball", "dx"), Target("ball", "dy"))
 
 
-def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
+def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> Iterator[Figure]:
     """Learned from one recording and tested on another; and the stream as it comes.
 
     Parameters
@@ -51,25 +51,17 @@ def pong(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Meas
     batch
         Whether learners that are fitted once are listed too.
     """
-    found: dict[tuple[str, float], list[float]] = {}
     for number, seed in enumerate(seeds):
         lesson, fresh = (Recording.load(folder / f"pong{part}-{seed}.npz") for part in ("", "-test"))
         model, rows = live(lesson, _TARGETS)
         _, tested = live(fresh, (), model=model, learn=False)
         if not number:
             print(f"{len(lesson):,} steps", model.describe(digits=4), sep="\n", flush=True)
-        for what, limit, share in _shares(tested["ball"].columns(), verbose=not number):
-            found.setdefault((what, limit), []).append(share)
+        yield from _shares(tested["ball"].columns(), verbose=not number)
         for kind in ("paddle", "wall"):
             named = any(names(model, target, kind) for target in _TARGETS)
-            found.setdefault((f"a clause names the {kind}", 1.0), []).append(float(named))
-        early = rows["ball"].until(STREAM)
-        for what, ratio in stream("ball", early, verbose=not number, batch=batch):
-            found.setdefault((what, -1.0), []).append(ratio)
-    return [
-        measured(what, limit, values, ">=") if limit > 0.0 else measured(what, -limit, values)
-        for (what, limit), values in found.items()
-    ]
+            yield f"a clause names the {kind}", 1.0, float(named), ">="
+        yield from stream("ball", rows["ball"].until(STREAM), verbose=not number, batch=batch)
 
 
 def kinds_of(
@@ -85,8 +77,7 @@ def kinds_of(
     return np.select([turned[:, 0], wall, same], [2, 1, 0], 3)
 
 
-def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterator[tuple[str, float, float]]:
-    """Figures with the limits that they must reach."""
+def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterator[Figure]:
     before = columns["now"]
     after, said = before + columns["change"], before + columns["said"]
     exact, kinds = np.abs(said - after) < 0.5, kinds_of(before, after, columns["seen"][:, HEIGHT])
@@ -99,10 +90,10 @@ def _shares(columns: dict[str, NDArray[np.float64]], *, verbose: bool) -> Iterat
         ]
         print(table(["fresh games", "frames", "exact", "dx", "dy", "sign of dx"], lines), "\n", flush=True)
     flight, wall, paddle = (kinds == number for number in range(3))
-    yield "flight, exact", 0.999, _share(exact[flight].all(axis=1))
-    yield "walls, exact", 0.99, _share(exact[wall].all(axis=1))
-    yield "paddles, sign of dx", 0.95, _share(sign[paddle])
-    yield "paddles, dy exact", 0.64, _share(exact[paddle, 1])
+    yield "flight, exact", 0.999, _share(exact[flight].all(axis=1)), ">="
+    yield "walls, exact", 0.99, _share(exact[wall].all(axis=1)), ">="
+    yield "paddles, sign of dx", 0.95, _share(sign[paddle]), ">="
+    yield "paddles, dy exact", 0.64, _share(exact[paddle, 1]), ">="
 
 
 def _share(right: NDArray[np.bool_]) -> float:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
 from relgym.envs.views import TableView
+from relgym.experiments.any_env.data import size
+from relgym.experiments.criterion import Figure
 from relgym.experiments.recording import Recording
 from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.reports.text import Cell, table
@@ -20,7 +22,7 @@ from relgym.scene.objects import Scene, Target, Transition
 from relgym.wrappers.follower import Follower
 from relgym.wrappers.study import Study
 
-__all__ = ["Rows", "live", "size", "stream"]
+__all__ = ["Rows", "live", "stream"]
 
 _COLUMNS = ("step", "now", "seen", "last", "change", "said", "sure", "ended")
 
@@ -171,16 +173,7 @@ def _alone(view: object, scene: Scene) -> NDArray[np.float64]:
     return np.concatenate(found)
 
 
-def size(
-    guess: NDArray[np.float64], change: NDArray[np.float64], keep: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """nRMSE-d on some rows: root mean square error over the change's standard deviation there, shape ``(m,)``."""
-    error = np.sqrt(np.square(guess[keep] - change[keep]).mean(axis=0))
-    found: NDArray[np.float64] = error / np.maximum(change[keep].std(axis=0), 1e-12)
-    return found
-
-
-def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tuple[str, float]]:
+def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[Figure]:
     """How the model compares with the best online baseline in the second half of the stream, property by property.
 
     Parameters
@@ -201,11 +194,11 @@ def stream(name: str, rows: Rows, *, verbose: bool, batch: bool) -> Iterator[tup
     said = {"relgym": columns["said"]} | told
     lines: list[list[Cell]] = []
     for kind, keep in kinds.items():
-        sizes = {who: size(guess, columns["change"], keep) for who, guess in said.items()}
+        sizes = {who: size(guess - columns["change"], columns["change"], keep) for who, guess in said.items()}
         for k, prop in enumerate(rows.properties):
             lines.append([f"{name}.{prop}, {kind}", *(f"{s[k]:.3g}" for s in sizes.values())])
             best = min(float(s[k]) for who, s in sizes.items() if who in ONLINE)
             what = f"{name}.{prop}, prequential, {kind}, over the best online baseline"
-            yield what, float(sizes["relgym"][k]) / best
+            yield what, 1.0, float(sizes["relgym"][k]) / best, "<="
     if verbose:
         print(table(["nRMSE-d", *titles(said)], lines), "\n", flush=True)

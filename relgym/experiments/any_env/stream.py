@@ -6,7 +6,7 @@ fitted to the first half. Only errors of the second half count.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from relgym.baselines.changes import ONLINE, predicted_changes, titles
 from relgym.config import ModelConfig
-from relgym.experiments.any_env.data import STUDIES, Lesson, collect, recommended
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.any_env.data import STUDIES, Lesson, collect, recommended, size
+from relgym.experiments.criterion import Figure
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.reports.text import Cell, table
 from relgym.model.world_model import WorldModel
@@ -29,11 +29,9 @@ ENVS: Final = ("mountain", "mountain-continuous", "cart", "pendulum", "lander")
 """The envs."""
 
 
-def prequential(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> list[Measure]:
+def prequential(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> Iterator[Figure]:
     """Prints a table per env, of the first seed; how the model compares with the best online baseline."""
-    found = []
     for name in ENVS[:1] if quick else ENVS:
-        ratios: dict[str, list[float]] = {}
         for number, (training, _) in enumerate(seeds):
             lesson = collect(STUDIES[name], 200 if quick else STEPS, training)
             sizes = _sizes(lesson, quick=quick)
@@ -41,29 +39,19 @@ def prequential(seeds: Sequence[tuple[int, int]], *, quick: bool = False) -> lis
                 print(_table(name, lesson, sizes), "\n", flush=True)
             mine, *others = (sizes[key] for key in ("relgym", *ONLINE[1:]) if key in sizes)
             for prop, ratio in zip(_names(lesson), mine / np.min(others, axis=0), strict=True):
-                ratios.setdefault(prop, []).append(float(ratio))
-        found += [measured(f"{name}.{p}, over the best online baseline", 1.0, v) for p, v in ratios.items()]
-    return found
+                yield f"{name}.{prop}, over the best online baseline", 1.0, float(ratio), "<="
 
 
 def _sizes(lesson: Lesson, *, quick: bool) -> dict[str, NDArray[np.float64]]:
     """nRMSE-d of every learner on the second half, shape ``(d,)`` each."""
-    half = len(lesson.transitions) // 2
-    change = lesson.change
-    x = lesson.before
-    spread = np.maximum(change[half:].std(axis=0), 1e-12)
-
-    def size(guess: NDArray[np.float64]) -> NDArray[np.float64]:
-        found: NDArray[np.float64] = np.sqrt(np.square(guess[-half:] - change[-half:]).mean(axis=0)) / spread
-        return found
-
+    change, x = lesson.change, lesson.before
+    late = np.arange(len(x)) >= len(x) // 2
     plain, model = ahead(lesson)
-    found = {"default": size(plain)}
     features = recommended(model)
-    found["relgym"] = size(ahead(lesson, features)[0]) if features else found["default"]
+    advised = ahead(lesson, features)[0] if features else plain
     print(f"{len(x):,} transitions; recommended: {features or 'nothing'}")
-    told = predicted_changes(x, change, once=not quick)
-    return found | {name: size(guess) for name, guess in told.items()}
+    told = {"default": plain, "relgym": advised} | predicted_changes(x, change, once=not quick)
+    return {name: size(guess - change, change, late) for name, guess in told.items()}
 
 
 def ahead(lesson: Lesson, features: tuple[str, ...] = ()) -> tuple[NDArray[np.float64], WorldModel]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +42,7 @@ from relgym.experiments.any_env.memory import LIVES, memory
 from relgym.experiments.any_env.stream import prequential
 from relgym.experiments.any_env.tables import RECORDED
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.criterion import Figure, gathered
 from relgym.experiments.seeds import TEST_SEEDS, TRAINING_SEEDS, TUNING_SEEDS, TUNING_TEST_SEED
 from relgym.model.world_model import WorldModel
 
@@ -99,10 +99,9 @@ SETTINGS: Final = {
 Pairs = Sequence[tuple[int, int]]
 
 
-def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
+def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> Iterator[Figure]:
     """Classic control: errors of one step by property, and the coefficients of the law in the source."""
     study = STUDIES[setting.study]
-    found: dict[tuple[str, float], list[float]] = {}
     for number, (training, test) in enumerate(seeds):
         lesson = collect(
             study, min(setting.train, 1_000) if quick else setting.train, training, setting.policy
@@ -110,14 +109,13 @@ def _one_step(setting: Setting, seeds: Pairs, *, quick: bool) -> list[Measure]:
         fresh = collect(study, 1_000 if quick else TEST, 2_000 + test, setting.policy)
         model = _model(study, setting, lesson, verbose=not number)
         for what, value in _evaluated(study, model, fresh).items():
-            found.setdefault((what, setting.limit), []).append(value)
+            yield what, setting.limit, value, "<="
         for prop, value in setting.constants:
             held = min((abs(c - value) for c in _constants(model, prop)), default=np.inf)
-            found.setdefault((f"{prop}: a mode for being held at {value:g}, off by", 1e-7), []).append(held)
+            yield f"{prop}: a mode for being held at {value:g}, off by", 1e-7, held, "<="
         for prop, term, value in study.weights if setting.policy is at_random else ():
             off = abs(weight(model, prop, term) / value - 1.0)
-            found.setdefault((f"{prop}: {value:g} {term}, off by", 0.01), []).append(off)
-    return [measured(what, limit, values) for (what, limit), values in found.items()]
+            yield f"{prop}: {value:g} {term}, off by", 0.01, off, "<="
 
 
 def _model(study: Study, setting: Setting, lesson: Lesson, *, verbose: bool) -> WorldModel:
@@ -211,21 +209,22 @@ def part(
     recordings, files
         Folder of what `examples/adapters` recorded, and a digest of what is in it.
     """
-    others: dict[str, Callable[..., list[Measure]]] = {
+    others: dict[str, Callable[..., Iterator[Figure]]] = {
         "lander": flight,
         "stream": prequential,
         "fleet": fleet,
     }
+    if recordings is not None:
+        figures = RECORDED[name](Path(recordings), [training for training, _ in seeds], batch=not quick)
+    elif name in others:
+        figures = others[name](seeds, quick=quick)
+    elif name in LIVES:
+        figures = memory(name, seeds, quick=quick, steps=steps, bound=steps and steps // 5)
+    else:
+        figures = _one_step(SETTINGS[name], seeds, quick=quick)
     told = io.StringIO()
     with redirect_stdout(told):
-        if recordings is not None:
-            measures = RECORDED[name](Path(recordings), [training for training, _ in seeds], batch=not quick)
-        elif name in others:
-            measures = others[name](seeds, quick=quick)
-        elif name in LIVES:
-            measures = memory(name, seeds, quick=quick, steps=steps, bound=steps and steps // 5)
-        else:
-            measures = _one_step(SETTINGS[name], seeds, quick=quick)
+        measures = gathered(figures)
     return Shown(measures, [told.getvalue().strip()]).to_json()
 
 

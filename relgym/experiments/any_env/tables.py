@@ -6,18 +6,15 @@ The envs' pins clash with ours, so they are recorded in environments of their ow
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from relgym.config import ModelConfig
-from relgym.experiments.any_env.data import recommended
+from relgym.experiments.any_env.data import recommended, size
 from relgym.experiments.any_env.pong import pong
-from relgym.experiments.any_env.recorded import Rows, live, size, stream
-from relgym.experiments.criterion import Measure, measured
+from relgym.experiments.any_env.recorded import Rows, live, stream
+from relgym.experiments.criterion import Figure
 from relgym.experiments.recording import Recording
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Target
@@ -30,16 +27,13 @@ LIMITS: Final = {"car": 0.07, "ego": 0.15}
 STEP: Final = 0.2
 """Seconds between two decisions: the weight of vx."""
 
-_Columns = dict[str, NDArray[np.float64]]
 
-
-def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[Measure]:
+def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> Iterator[Figure]:
     """Where cars will be; and the stream as it comes, beside other learners.
 
     Steps that end an episode are crashes, which push the cars apart; they are counted apart, and in the stream too.
     """
     targets = [Target(name, "x") for name in LIMITS]
-    found: dict[tuple[str, float], list[float]] = {}
     for number, seed in enumerate(seeds):
         lesson, fresh = (Recording.load(folder / f"highway{k}-{seed}.npz") for k in ("", "-test"))
         model, rows = _advised(lesson, targets, verbose=not number)
@@ -48,13 +42,11 @@ def highway(folder: Path, seeds: Sequence[int], *, batch: bool = True) -> list[M
             columns = tested[name].columns()
             ended = columns["ended"].astype(bool)
             for what, keep in (("the episode goes on", ~ended), ("all steps", ended | True)):
-                error = float(size(columns["said"], columns["change"], keep)[0])
-                found.setdefault((f"{name}.x, {what}", limit), []).append(error)
+                error = size(columns["said"] - columns["change"], columns["change"], keep)
+                yield f"{name}.x, {what}", limit, float(error[0]), "<="
             if name == "car":
-                found.setdefault((f"{name}: {STEP} vx, off by", 0.01), []).append(_off(model, name))
-            for what, ratio in stream(name, rows[name], verbose=not number, batch=batch):
-                found.setdefault((what, 1.0), []).append(ratio)
-    return [measured(what, limit, values) for (what, limit), values in found.items()]
+                yield f"{name}: {STEP} vx, off by", 0.01, _off(model, name), "<="
+            yield from stream(name, rows[name], verbose=not number, batch=batch)
 
 
 def _advised(
@@ -92,8 +84,5 @@ def _off(model: WorldModel, name: str) -> float:
     return abs(weight / STEP - 1.0)
 
 
-RECORDED: Final[dict[str, Callable[..., list[Measure]]]] = {
-    "highway": highway,
-    "pong": pong,
-}
+RECORDED: Final[dict[str, Callable[..., Iterator[Figure]]]] = {"highway": highway, "pong": pong}
 """By name; from a folder of recordings, and of training seeds."""
