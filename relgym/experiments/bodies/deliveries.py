@@ -95,18 +95,11 @@ def delivered(*, arm: str, seed: int, episodes: int, first: int = 0) -> dict[str
 def _simulator(arm: str, seed: int) -> Simulator:
     """What was learned from random actions, transition by transition, with the env's own reward."""
     env = TransitionRecorder(gym.make(DELIVERY.env_id, disable_env_checker=True))
-    schema: Any = env.get_wrapper_attr("schema")
     task: Any = env.get_wrapper_attr("task")
-    if arm == "relgym":
-        model: Any = WorldModel(schema)
-    else:
-        from relgym.baselines.ensemble import MLPEnsemble
-        from relgym.baselines.neural_world import NeuralWorldModel
-        from relgym.wrappers.flat import FlatView
-
-        # The nets see the scene as a policy does: relative and scaled, which is to their advantage.
-        features = FlatView(env).get_wrapper_attr("flattener")
-        model = NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))
+    relational = arm == "relgym"
+    model: Any = (
+        WorldModel(env.get_wrapper_attr("schema")) if relational else dyna_arms.nets_of(env, seed=seed)
+    )
     env.action_space.seed(seed)
     rng = np.random.default_rng(seed)
     env.reset(seed=seed)
@@ -118,14 +111,14 @@ def _simulator(arm: str, seed: int) -> Simulator:
         _, _, terminated, truncated, _ = env.step(action)
         left, lasted = left - 1, lasted + 1
         for real in env.take():
-            if arm == "relgym":
+            if relational:
                 compare_and_learn(model, real.transition, model.predict_one(real.transition.before))
             else:
                 model.learn_one(real.transition)
         if terminated or truncated or lasted == CUT:
             env.reset()
             left, lasted = 0, 0
-    if arm == "relgym":
+    if relational:
         model.finish()
         return ModelSimulator(model, env, task=task, repeat=DELIVERY.repeat)
     return NeuralSimulator(model, env, DELIVERY.repeat, task)

@@ -21,6 +21,7 @@ from relgym.wrappers.flat import FlatView
 from relgym.wrappers.truncated_episodes import TruncatedEpisodes
 
 if TYPE_CHECKING:
+    from relgym.baselines.neural_world import NeuralWorldModel
     from relgym.wrappers.sb3.dyna import Dyna
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "make_agent",
     "make_dyna",
     "make_env",
+    "nets_of",
 ]
 
 WARM_UP: Final = 250
@@ -332,12 +334,17 @@ def _dyna(arm: Arm, course: Course, model: Any, *, seed: int, **changes: Any) ->
 
 
 def _model(arm: Arm, env: gym.Env[Any, Any], seed: int) -> Any:
-    schema = env.get_wrapper_attr("schema")
     if arm.model == "relational":
-        return relgym.WorldModel(schema)
+        return relgym.WorldModel(env.get_wrapper_attr("schema"))
+    return nets_of(env, seed=seed)
+
+
+def nets_of(env: gym.Env[Any, Any], *, seed: int) -> NeuralWorldModel:
+    """An ensemble of nets that learns an env's world, and knows nothing yet."""
     from relgym.baselines.ensemble import MLPEnsemble
     from relgym.baselines.neural_world import NeuralWorldModel
 
-    # The nets see the scene as the policy does: relative and scaled, which is to their advantage.
-    features = env.get_wrapper_attr("flattener")
+    # The nets see the scene as a policy does: relative and scaled, which is to their advantage.
+    flat = env if env.has_wrapper_attr("flattener") else FlatView(env)
+    features, schema = flat.get_wrapper_attr("flattener"), env.get_wrapper_attr("schema")
     return NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))

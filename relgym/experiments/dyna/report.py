@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,18 @@ from relgym.model.reports.text import Cell, table
 if TYPE_CHECKING:
     from relgym.experiments.dyna.course import Run
 
-__all__ = ["curves", "draw_runs", "interquartile_mean", "interval", "reached", "summary"]
+__all__ = [
+    "curves",
+    "draw_runs",
+    "draw_successes",
+    "interquartile_mean",
+    "interval",
+    "reached",
+    "summary",
+]
+
+Curve: TypeAlias = Sequence[Sequence[int]]
+"""Pairs of real steps and successes of 100."""
 
 RESAMPLES: Final = 2_000
 """Bootstrap samples of the seeds."""
@@ -66,12 +77,12 @@ def interval(
     return interquartile_mean(values), low, high
 
 
-def curves(runs: Sequence[Run]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Real steps, shape ``(points,)``, and successes, shape ``(points, seeds)``; a run keeps its last value."""
-    steps = sorted({point for run in runs for point, _ in run.curve})
+def curves(runs: Sequence[Curve]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Real steps, shape ``(points,)``, and successes, shape ``(points, runs)``; a run keeps its last value."""
+    steps = sorted({int(point) for run in runs for point, _ in run})
     values = np.zeros((len(steps), len(runs)))
     for column, run in enumerate(runs):
-        known = dict(run.curve)
+        known: dict[int, int] = dict(map(tuple, run))  # type: ignore[arg-type]
         latest = 0
         for row, point in enumerate(steps):
             latest = known.get(point, latest)
@@ -112,7 +123,26 @@ def _times(runs: Sequence[Run]) -> tuple[list[float], ...]:
 
 
 def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> Path:
-    """Draw successes over real steps: interquartile mean and 95 % interval of each arm.
+    """Draw successes over real steps (`draw_successes`)."""
+    shown = {ARMS[arm].title: [run.curve for run in own] for arm, own in _by_arm(runs)}
+    return draw_successes(path, shown, title, "real steps", seed=seed)
+
+
+def draw_successes(
+    path: Path, shown: Mapping[str, Sequence[Curve] | int], title: str, unit: str, *, seed: int = 0
+) -> Path:
+    """Draw successes of 100 over what they cost: interquartile mean and 95 % interval of each arm.
+
+    Parameters
+    ----------
+    path
+        Of the picture.
+    shown
+        Curves of each arm by its title; a number of successes, which costs nothing, is a level.
+    title, unit
+        Of the picture, and of the costs.
+    seed
+        Of the intervals.
 
     Raises
     ------
@@ -125,14 +155,17 @@ def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> 
     rng = np.random.default_rng(seed)
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     axes = figure.subplots()
-    for arm, own in _by_arm(runs):
+    for arm, own in shown.items():
+        if isinstance(own, int):
+            axes.axhline(own, color="0.3", linestyle=":", label=arm)
+            continue
         steps, values = curves(own)
         mean, low, high = interval(values, rng=rng)
-        label = f"{ARMS[arm].title} ({len(own)} {'seed' if len(own) == 1 else 'seeds'})"
+        label = f"{arm} ({len(own)} {'seed' if len(own) == 1 else 'seeds'})"
         (line,) = axes.plot(steps, mean, marker="o", markersize=3, label=label)
         axes.fill_between(steps, low, high, alpha=0.2, color=line.get_color())
     axes.axhline(90, color="0.6", linewidth=0.8, linestyle="--")
-    axes.set(title=title, xlabel="real steps", ylabel="successes of 100", ylim=(-2, 102))
+    axes.set(title=title, xlabel=unit, ylabel="successes of 100", ylim=(-2, 102))
     axes.legend(loc="best", fontsize="small")
     figure.savefig(path, dpi=120)
     return path

@@ -278,20 +278,12 @@ def make_agent(course: Course, arm: Arm, *, seed: int, env: gym.Env[Any, Any] | 
     if not arm.explores:
         options["exploration"] = 0.0
     if arm.model == "neural":
-        from relgym.baselines.ensemble import MLPEnsemble
-        from relgym.baselines.neural_world import NeuralWorldModel
-        from relgym.wrappers.flat import FlatView
-
-        # The nets see the scene as a policy does: relative and scaled, which is to their advantage.
-        schema: Any = env.get_wrapper_attr("schema")
-        features = FlatView(env).get_wrapper_attr("flattener")
-        model = NeuralWorldModel(schema, features=features, ensemble=MLPEnsemble(seed=seed))
 
         def simulated(trainer: ModelTrainer) -> NeuralSimulator:
             given: Any = getattr(env.unwrapped, "task", None) if arm.task == "given" else None
             return NeuralSimulator(trainer.model, env, course.repeat, given)
 
-        options |= {"model": model, "simulator": simulated}
+        options |= {"model": dyna_arms.nets_of(env, seed=seed), "simulator": simulated}
     return PlanningAgent(env, task=arm.task, **options)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from statistics import median
-from typing import Any, Final, TypeAlias
+from typing import Final
 
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Shown
 from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.dyna.course import ENOUGH
-from relgym.experiments.jobs.task import Task
 from relgym.experiments.plan.course import COURSES
 from relgym.experiments.plan.foreign import FOREIGN
 from relgym.model.reports.text import Cell, table
@@ -18,8 +17,6 @@ __all__ = ["QUESTIONS", "SEEDS"]
 
 SEEDS: Final = tuple(range(10))
 """On which nothing was chosen; what was chosen was chosen on seeds from 100 on."""
-
-_PLAN: Final = "relgym.experiments.plan.course"
 
 _EXPLORATION: Final[Mapping[str, tuple[int, int]]] = {
     "truck": (1_500, 25),
@@ -48,46 +45,25 @@ _SOLVED: Final = 95
 """Successes of 100 that count as solved where a model was learned from random steps."""
 
 
-_Found: TypeAlias = Sequence[tuple[Task, Any]]
-
-
-def _question(
-    title: str, tasks: Callable[[Sequence[int], int], list[Task]], told: Callable[[_Found], Shown]
-) -> Benchmark:
-    """Of seeds and episodes of a test follows what has to be run, and of that what is told."""
-
-    def measure(extent: Extent, known: Known) -> Shown:
-        return told(known.of(tasks(extent.first(SEEDS), extent["episodes"])))
-
-    return Benchmark(title, measure)
-
-
-def _exploration_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
-    return [
-        Task(
-            f"{_PLAN}:knowing",
-            {"course": course, "explores": explores, "seed": seed, "steps": steps, "every": every},
-            f"plan exploration {course}",
-        )
-        for seed in seeds
+def _exploration(extent: Extent, known: Known) -> Shown:
+    asked = [
+        {"course": course, "explores": explores, "seed": seed, "steps": steps, "every": every}
+        for seed in extent.first(SEEDS)
         for course, (steps, every) in _EXPLORATION.items()
         for explores in (True, False)
     ]
-
-
-def _exploration_told(found: _Found) -> Shown:
-    known = {
-        (task.arguments["course"], task.arguments["seed"], task.arguments["explores"]): value["known_at"]
-        for task, value in found
+    found = {
+        (arguments["course"], arguments["seed"], arguments["explores"]): value["known_at"]
+        for arguments, value in known.pairs("relgym.experiments.plan.course:knowing", asked)
     }
     measures: list[Measure] = []
     rows: list[list[Cell]] = []
     for course, (steps, every) in _EXPLORATION.items():
         ratios = []
-        for seed in sorted({seed for name, seed, _ in known if name == course}):
-            if not {(course, seed, True), (course, seed, False)} <= known.keys():
+        for seed in sorted({seed for name, seed, _ in found if name == course}):
+            if not {(course, seed, True), (course, seed, False)} <= found.keys():
                 continue
-            both = known[course, seed, True], known[course, seed, False]
+            both = found[course, seed, True], found[course, seed, False]
             own, other = (steps + every if at is None else at for at in both)
             ratios.append(other / own)
             told = [f"> {steps:,}" if at is None else f"{at:,}" for at in both]
@@ -103,17 +79,12 @@ def _exploration_told(found: _Found) -> Shown:
     return Shown(measures, [table(["world", "seed", "explores", "at random", "ratio"], rows)])
 
 
-def _change_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
-    return [
-        Task(f"{_PLAN}:recovering", {"seed": seed, "steps": _CHANGED, "episodes": episodes}, "plan change")
-        for seed in seeds
-    ]
-
-
-def _change_told(found: _Found) -> Shown:
+def _change(extent: Extent, known: Known) -> Shown:
+    size = {"steps": _CHANGED, "episodes": extent["episodes"]}
+    asked = [{"seed": seed, **size} for seed in extent.first(SEEDS)]
     rows: list[list[Cell]] = []
     back, ahead = [], []
-    for task, value in found:
+    for arguments, value in known.pairs("relgym.experiments.plan.course:recovering", asked):
         curve, baseline = value["curve"], value["baseline"]
         again = next((at for at, good in curve[1:] if good >= ENOUGH), None)
         back.append(_CHANGED + 50 if again is None else again)
@@ -121,7 +92,7 @@ def _change_told(found: _Found) -> Shown:
         ahead += [good - at_once[at] for at, good in baseline if at in at_once]
         rows.append(
             [
-                str(task.arguments["seed"]),
+                str(arguments["seed"]),
                 ", ".join(str(good) for _, good in curve),
                 "never" if again is None else str(again),
                 ", ".join(f"{good} after {at}" for at, good in baseline),
@@ -135,53 +106,29 @@ def _change_told(found: _Found) -> Shown:
     return Shown(measures, [table(heading, rows)])
 
 
-def _pit_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
-    return [
-        Task(
-            "relgym.experiments.plan.pit:falling",
-            {"seed": seed, "safe": safe, "episodes": episodes},
-            "plan pit",
-        )
-        for seed in seeds
-        for safe in (True, False)
-    ]
-
-
-def _pit_told(found: _Found) -> Shown:
+def _pit(extent: Extent, known: Known) -> Shown:
     def falls(*, safe: bool) -> list[float]:
-        return [
-            100.0 * value["falls"] / task.arguments["episodes"]
-            for task, value in found
-            if task.arguments["safe"] is safe
-        ]
+        asked = [{"seed": seed, "safe": safe, "episodes": episodes} for seed in extent.first(SEEDS)]
+        found = known("relgym.experiments.plan.pit:falling", asked)
+        return [100.0 * value["falls"] / episodes for value in found]
 
+    episodes = extent["episodes"]
+    careful, bold = falls(safe=True), falls(safe=False)
     measures = []
-    if careful := falls(safe=True):
+    if careful:
         measures.append(measured("falls in 100 episodes, safe", _FALLS, careful))
-    if bold := falls(safe=False):
+    if bold:
         measures.append(measured("falls in 100 episodes, not safe (it is a pit)", _FALLS + 1, bold, ">="))
     return Shown(measures)
 
 
-def _foreign_tasks(seeds: Sequence[int], episodes: int) -> list[Task]:
-    return [
-        Task(
-            f"relgym.experiments.plan.foreign:{function}",
-            {"name": name, "seed": seed, "episodes": episodes},
-            f"plan {function} {name}",
-        )
-        for seed in seeds
-        for function in ("planned", "agent_alone")
-        for name in FOREIGN
-    ]
-
-
-def _foreign_told(found: _Found) -> Shown:
+def _foreign(extent: Extent, known: Known) -> Shown:
     measures: list[Measure] = []
     rows: list[list[Cell]] = []
     for name, place in FOREIGN.items():
+        asked = [{"name": name, "seed": seed, "episodes": extent["episodes"]} for seed in extent.first(SEEDS)]
         own, baseline = (
-            [value for task, value in found if task.name == function and task.arguments["name"] == name]
+            known(f"relgym.experiments.plan.foreign:{function}", asked)
             for function in ("planned", "agent_alone")
         )
         if own:
@@ -205,9 +152,9 @@ def _foreign_told(found: _Found) -> Shown:
 
 
 QUESTIONS: Final[Mapping[str, Benchmark]] = {
-    "exploration": _question("Exploration against random play", _exploration_tasks, _exploration_told),
-    "change": _question("Half the gravity, and friction, after 1,000 steps", _change_tasks, _change_told),
-    "pit": _question("A pit that was never seen", _pit_tasks, _pit_told),
-    "foreign": _question("Pendulum and MountainCar", _foreign_tasks, _foreign_told),
+    "exploration": Benchmark("Exploration against random play", _exploration),
+    "change": Benchmark("Half the gravity, and friction, after 1,000 steps", _change),
+    "pit": Benchmark("A pit that was never seen", _pit),
+    "foreign": Benchmark("Pendulum and MountainCar", _foreign),
 }
 """By name."""

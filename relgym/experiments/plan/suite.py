@@ -8,18 +8,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-import numpy as np
-
 from relgym.experiments.benchmark import Benchmark, Extent, Known, Option, Shown, Suite
 from relgym.experiments.criterion import Measure, measured
-from relgym.experiments.dyna.report import interval
+from relgym.experiments.dyna.report import draw_successes
 from relgym.experiments.jobs.task import Task
 from relgym.experiments.plan.course import ARMS, COURSES
 from relgym.experiments.plan.questions import QUESTIONS, SEEDS
-from relgym.experiments.plots import require_matplotlib
 from relgym.model.reports.text import Cell, table
 
-__all__ = ["SUITE", "draw", "tasks", "told"]
+__all__ = ["SUITE", "tasks", "told"]
 
 _HEAD: Final = """`relgym benchmark plan` wrote this page, but for what stands below the tables, which it leaves alone.
 An agent begins with random actions, learns the world's laws, and searches in what it has learned: nothing is trained.
@@ -124,7 +121,7 @@ def told(course: str, found: Mapping[str, Sequence[Any]], *, steps: int, episode
     rows += _others(course, others)
     heading = ["arm", "solved", "median", "each", "last, %", "learning", "decision"]
     notes = [table(heading, rows), f"Tests of {episodes} episodes."]
-    return Shown(measures, notes, (lambda path: draw(path, course, found)) if learned else None)
+    return Shown(measures, notes, (lambda path: _draw(path, course, found)) if learned else None)
 
 
 def _against_others(found: Mapping[str, Sequence[Any]], steps: int) -> list[Measure]:
@@ -182,44 +179,15 @@ def _others(course: str, text: str) -> list[list[Cell]]:
     return rows
 
 
-def draw(path: Path, course: str, found: Mapping[str, Sequence[Any]]) -> Path:
-    """Draw successes over real decisions: interquartile mean and 95 % interval of each arm.
-
-    Raises
-    ------
-    ConfigError
-        matplotlib isn't installed.
-    """
-    require_matplotlib()
-    from matplotlib.figure import Figure  # no pyplot: it would choose a window system
-
-    rng = np.random.default_rng(0)
-    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
-    axes = figure.subplots()
+def _draw(path: Path, course: str, found: Mapping[str, Sequence[Any]]) -> Path:
+    """Draw successes over real decisions."""
+    shown: dict[str, Any] = {}
     for arm, runs in found.items():
-        if arm == "engine":
-            for made in runs:
-                axes.axhline(made["successes"], color="0.3", linestyle=":", label="the exact engine")
-            continue
-        if not runs:
-            continue
-        steps = sorted({int(at) for run in runs for at, _ in run["curve"]})
-        values = np.array([[_at(run["curve"], at) for run in runs] for at in steps], dtype=np.float64)
-        mean, low, high = interval(values, rng=rng)
-        label = f"{ARMS[arm].title} ({len(runs)} {'seed' if len(runs) == 1 else 'seeds'})"
-        (line,) = axes.plot(steps, mean, marker="o", markersize=3, label=label)
-        axes.fill_between(steps, low, high, alpha=0.2, color=line.get_color())
-    axes.axhline(90, color="0.6", linewidth=0.8, linestyle="--")
-    title = COURSES[course].title
-    axes.set(title=title, xlabel="real decisions", ylabel="successes of 100", ylim=(-2, 102))
-    axes.legend(loc="best", fontsize="small")
-    figure.savefig(path, dpi=120)
-    return path
-
-
-def _at(curve: Sequence[Sequence[int]], at: int) -> int:
-    """Successes at a test, or at the last one before: a run that has succeeded is stopped."""
-    return max([(step, good) for step, good in curve if step <= at], default=(0, 0))[1]
+        if arm == "engine" and runs:
+            shown["the exact engine"] = int(runs[0]["successes"])
+        elif runs:
+            shown[ARMS[arm].title] = [run["curve"] for run in runs]
+    return draw_successes(path, shown, COURSES[course].title, "real decisions")
 
 
 SUITE: Final = Suite(

@@ -45,7 +45,9 @@ def test_intervals_hold_the_mean_and_shrink_to_it(rng: np.random.Generator) -> N
 
 
 def test_a_solved_run_keeps_its_last_value() -> None:
-    steps, values = curves([of("relgym", 0, 10, 95, 96), of("relgym", 1, 5, 10, 20, 30)])
+    steps, values = curves(
+        [run.curve for run in (of("relgym", 0, 10, 95, 96), of("relgym", 1, 5, 10, 20, 30))]
+    )
     assert steps.tolist() == [250, 500, 750, 1000]
     assert values.T.tolist() == [[10, 95, 96, 96], [5, 10, 20, 30]]
 
