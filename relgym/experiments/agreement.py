@@ -8,7 +8,6 @@ runs, a third as they are, a third shaken a little and a third a lot.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -31,7 +30,7 @@ from relgym.scene.objects import Float2D, SceneLayout
 from relgym.wrappers import ModelLearner
 from relgym.wrappers.follower import scenes_of
 
-__all__ = ["MODELS", "SUITE", "Agreement", "agreement", "trial"]
+__all__ = ["MODELS", "SUITE", "agreement", "trial"]
 
 _SHAKEN: Final = (0.0, 1e-3, 0.3)
 """By how much scenes are changed, as a share of how much each number varies."""
@@ -44,36 +43,6 @@ _ALONE: Final = 300
 
 Taught = tuple[WorldModel, SceneLayout, Float2D]
 """A model, a layout, and state vectors of fresh scenes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """How two ways to run a model agree with arrays.
-
-    Attributes
-    ----------
-    scenes
-        How many were asked.
-    outcomes
-        Share of predictions with the same outcome, mode and margin, by the kernel.
-    largest
-        Largest difference of a value, by the kernel.
-    alone
-        Whether scenes asked alone got the same bits.
-    exported, exported_outcomes, exported_largest
-        Scenes asked of the exported Python, and the same of it.
-    refused
-        Why there is no program; empty: there is.
-    """
-
-    scenes: int
-    outcomes: float
-    largest: float
-    alone: bool
-    exported: int
-    exported_outcomes: float
-    exported_largest: float
-    refused: str = ""
 
 
 def _of_env(env_id: str, steps: int, arguments: dict[str, Any], options: dict[str, Any]) -> Taught:
@@ -132,7 +101,7 @@ def _scenes(layout: SceneLayout, vectors: Float2D, count: int) -> Float2D:
     return shaken
 
 
-def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
+def agreement(taught: Taught, *, scenes: int, exported: int) -> dict[str, Any]:
     """Ask a model of many scenes, in all ways there are.
 
     Parameters
@@ -141,6 +110,13 @@ def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
         What is asked.
     scenes, exported
         How many are asked of the kernel, and how many of the exported Python.
+
+    Returns
+    -------
+    ``scenes`` asked; ``outcomes``, the share of predictions with the same outcome, mode and margin by the kernel, and
+    ``largest``, the largest difference of a value; ``alone``, whether scenes asked alone got the same bits;
+    ``exported``, ``exported_outcomes`` and ``exported_largest``, the same of the exported Python; ``refused``, why
+    there is no program, or empty.
     """
     model, layout, some = taught
     parts, machine = model._parts, KERNEL.load()
@@ -157,7 +133,9 @@ def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
             known = predict_many(parts, parts.perception.percept(layout, chunk), layout, chunk)
             told = runner.many(chunk)
         if told is None:
-            return Agreement(0, 0.0, 0.0, False, 0, 0.0, 0.0, "laws of hypothesis classes that were added")
+            why = "laws of hypothesis classes that were added"
+            nothing = dict.fromkeys(("outcomes", "largest", "exported_outcomes", "exported_largest"), 0.0)
+            return {**nothing, "scenes": 0, "alone": False, "exported": 0, "refused": why}
         same.append(_same(told, known))
         largest = max(largest, _apart(told.vectors, known.vectors))
         if at < exported:
@@ -172,8 +150,16 @@ def agreement(taught: Taught, *, scenes: int, exported: int) -> Agreement:
         told is not None and told.vectors.tobytes() == whole.vectors[k : k + 1].tobytes()
         for k, told in enumerate(runner.many(vectors[k : k + 1]) for k in range(_ALONE))
     )
-    means = float(np.mean(same)), float(np.mean(same_exported or 1.0))
-    return Agreement(scenes, means[0], largest, alone, exported, means[1], largest_exported)
+    return {
+        "scenes": scenes,
+        "outcomes": float(np.mean(same)),
+        "largest": largest,
+        "alone": alone,
+        "exported": exported,
+        "exported_outcomes": float(np.mean(same_exported or 1.0)),
+        "exported_largest": largest_exported,
+        "refused": "",
+    }
 
 
 def _same(a: BatchPrediction, b: BatchPrediction) -> float:
@@ -188,7 +174,7 @@ def _apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 def trial(*, model: str, scenes: int, exported: int) -> dict[str, Any]:
     """`agreement` of one of `MODELS`, as a task for the store of results."""
-    return asdict(agreement(MODELS[model](), scenes=scenes, exported=exported))
+    return agreement(MODELS[model](), scenes=scenes, exported=exported)
 
 
 def _models(extent: Extent, known: Known) -> Shown:
@@ -214,12 +200,8 @@ def _models(extent: Extent, known: Known) -> Shown:
             rows.append([arguments["model"], f"left to arrays: {one['refused']}", *[""] * 6])
             continue
         kernel, exported = (
-            [f"{one['scenes']:,}", f"{100 * one['outcomes']:.5g}", f"{one['largest']:.1e}"],
-            [
-                f"{one['exported']:,}",
-                f"{100 * one['exported_outcomes']:.5g}",
-                f"{one['exported_largest']:.1e}",
-            ],
+            [f"{one[asked]:,}", f"{100 * one[f'{which}outcomes']:.5g}", f"{one[f'{which}largest']:.1e}"]
+            for asked, which in (("scenes", ""), ("exported", "exported_"))
         )
         rows.append([arguments["model"], *kernel, "yes" if one["alone"] else "no", *exported])
     heads = ["model", "scenes", "same, %", "apart", "alone", "exported", "same, %", "apart"]

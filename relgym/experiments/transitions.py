@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Final
 
@@ -30,7 +30,7 @@ from relgym.model.predicting.prequential import StepReport
 from relgym.model.reports.text import Cell, table
 from relgym.wrappers import ModelLearner
 
-__all__ = ["SUITE", "WORLDS", "Course", "World", "course", "falling", "sliding", "trial"]
+__all__ = ["SUITE", "WORLDS", "World", "course", "falling", "sliding", "trial"]
 
 WINDOW, RIGHT = 100, 99
 """So many of so many steps in a row are right once a law is known: one slip is no relapse."""
@@ -108,46 +108,36 @@ WORLDS: Final[Mapping[str, World]] = {
 """Worlds by name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Course:
-    """How a run went; counts of steps are None where that never came to be.
+def course(world: World, seed: int) -> dict[str, Any]:
+    """Learn a world from random actions, and what becomes of it.
 
-    Attributes
-    ----------
-    first, again
-        Steps until predictions were right, from the beginning and from the change on.
-    slips
-        Predictions between the change and being right again that were claimed and off.
-    off
-        Share of all predictions after the change that were; None: no change.
-    late
-        Share of the last steps that were right in all properties.
+    Returns
+    -------
+    ``first`` and ``again``: steps until predictions were right, from the beginning and from the change on; None where
+    that never came to be. ``slips``: predictions between the change and being right again that were claimed and off;
+    ``off``: the share of all predictions after the change that were, or None. ``late``: the share of the last steps
+    that were right in all properties.
     """
-
-    first: int | None
-    again: int | None
-    slips: int
-    off: float | None
-    late: float
-
-
-def course(world: World, seed: int) -> Course:
-    """Learn a world from random actions, and what becomes of it."""
     learner = ModelLearner(world.make())
     before = list(islice(_reports(learner, seed), world.steps))
     first = _until(before)
     if world.changed is None:
-        return Course(first, None, 0, None, float(np.mean([not r.wrong for r in before[-WINDOW:]])))
+        return {"first": first, "again": None, "slips": 0, "off": None, "late": _late(before)}
     other = ModelLearner(world.make(**world.changed), model=learner.get_wrapper_attr("model"))
     after = list(islice(_reports(other, seed + 1_000), world.steps))
-    again = _until(after)
-    return Course(
-        first,
-        again,
-        int(_off(after)[:again].sum()),
-        float(_off(after).sum() / max(sum(len(r.residuals) for r in after), 1)),
-        float(np.mean([not r.wrong for r in after[-WINDOW:]])),
-    )
+    again, off = _until(after), _off(after)
+    return {
+        "first": first,
+        "again": again,
+        "slips": int(off[:again].sum()),
+        "off": float(off.sum() / max(sum(len(r.residuals) for r in after), 1)),
+        "late": _late(after),
+    }
+
+
+def _late(reports: Sequence[StepReport]) -> float:
+    """Share of the last steps that were right in all properties."""
+    return float(np.mean([not r.wrong for r in reports[-WINDOW:]]))
 
 
 def _reports(learner: ModelLearner, seed: int) -> Iterator[StepReport]:
@@ -196,7 +186,7 @@ def trial(*, world: str, seed: int) -> dict[str, Any]:
     """`course` in one of `WORLDS`, as a task for the store of results."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # other people's envs warn when they are made
-        return asdict(course(WORLDS[world], seed))
+        return course(WORLDS[world], seed)
 
 
 SEEDS: Final = tuple(range(40))

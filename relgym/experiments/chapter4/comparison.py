@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, Final
 
@@ -62,24 +62,40 @@ def regress(
     meaning = Columns(velocity, seen.own, seen.objects)
     model = make_regressor(baseline, known.settings[setting], columns=meaning, rng=rng)
     questions, answers = _examples(fresh, seen)
+
+    def teach(episode: Episode) -> None:
+        _teach(model, *_examples([episode], seen), velocity if known.change else ())
+
+    def ask() -> NDArray[np.float64]:
+        predicted = model.predict_batch(questions)
+        return predicted + (questions[:, list(velocity)] if known.change else 0.0)
+
+    def scored(predicted: NDArray[np.float64]) -> dict[str, Any]:
+        return _scores(predicted, answers, fresh, experiment)
+
+    course = _course(episodes, checkpoints, teach, ask, scored)
+    return {**course, "setting": dict(known.settings[setting]), "bytes": weight_of(model)}
+
+
+def _course(
+    episodes: Sequence[Episode],
+    checkpoints: Sequence[int],
+    teach: Callable[[Episode], None],
+    ask: Callable[[], Any],
+    scored: Callable[[Any], dict[str, Any]],
+) -> dict[str, Any]:
+    """Scores after some numbers of episodes, and seconds spent on learning and on all tests."""
     scores, learning, asking = [], 0.0, 0.0
     for count, episode in enumerate(episodes, start=1):
         start = perf_counter()
-        _teach(model, *_examples([episode], seen), velocity if known.change else ())
+        teach(episode)
         learning += perf_counter() - start
         if count in checkpoints:
             start = perf_counter()
-            predicted = model.predict_batch(questions)
-            predicted += questions[:, list(velocity)] if known.change else 0.0
+            said = ask()
             asking += perf_counter() - start
-            scores.append({"episodes": count, "targets": _scores(predicted, answers, fresh, experiment)})
-    return {
-        "scores": scores,
-        "setting": dict(known.settings[setting]),
-        "learning": learning,
-        "asking": asking,
-        "bytes": weight_of(model),
-    }
+            scores.append({"episodes": count, "targets": scored(said)})
+    return {"scores": scores, "learning": learning, "asking": asking}
 
 
 def _teach(model: Regressor, x: NDArray[np.float64], y: NDArray[np.float64], present: Sequence[int]) -> None:
@@ -147,23 +163,16 @@ def classify(
         t: make_classifier(baseline, settings, rng=np.random.default_rng([seed, order])) for t in TARGETS
     }
     asked = {target: _labelled(fresh, seen, target, experiment) for target in TARGETS}
-    scores, learning, asking = [], 0.0, 0.0
-    for count, episode in enumerate(episodes, start=1):
-        start = perf_counter()
+
+    def teach(episode: Episode) -> None:
         for target, model in models.items():
             _tell(model, *_labelled([episode], seen, target, experiment)[:2])
-        learning += perf_counter() - start
-        if count in checkpoints:
-            start = perf_counter()
-            scores.append({"episodes": count, "targets": {t: _errors(models[t], *asked[t]) for t in TARGETS}})
-            asking += perf_counter() - start
-    return {
-        "scores": scores,
-        "setting": dict(settings),
-        "learning": learning,
-        "asking": asking,
-        "bytes": weight_of(models),
-    }
+
+    def ask() -> dict[str, Any]:
+        return {target: _errors(models[target], *asked[target]) for target in TARGETS}
+
+    course = _course(episodes, checkpoints, teach, ask, dict)
+    return {**course, "setting": dict(settings), "bytes": weight_of(models)}
 
 
 def _tell(model: Classifier, x: NDArray[np.float64], labels: NDArray[np.int64]) -> None:

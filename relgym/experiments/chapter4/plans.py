@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final, Literal
+from typing import Any, Final, Literal, TypeAlias
 
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS, installed
 from relgym.baselines.tuned import setting_of
@@ -126,83 +126,68 @@ def rollouts(protocol: Protocol) -> Plan:
 
 def noise(protocol: Protocol) -> Plan:
     """The sweep of §4.6: every expected variance against every true one; groups are the expected ones."""
-    runs = protocol.runs(protocol.noise_batches)
-    plan: dict[str, list[Task]] = {}
-    for expected in (*protocol.variances, "auto", "default"):
-        for true in protocol.variances:
-            for run in runs:
-                arguments = {
-                    "expected": expected,
-                    "true": true,
-                    "seed": run.seed,
-                    "order": run.order,
-                    "episodes": protocol.after(1)[-1],
-                    "tests": protocol.tests(),
-                }
-                task = Task(
-                    f"{_ROOM}.noisy:lesson", arguments, f"expected {expected}", _without(f"{expected}")
-                )
-                plan.setdefault(f"{expected}", []).append(task)
-    return plan
+    size = {"episodes": protocol.after(1)[-1], "tests": protocol.tests()}
+    return {
+        f"{expected}": [
+            Task(
+                f"{_ROOM}.noisy:lesson",
+                {"expected": expected, "true": true, "seed": run.seed, "order": run.order, **size},
+                f"expected {expected}",
+                _without(f"{expected}"),
+            )
+            for true in protocol.variances
+            for run in protocol.runs(protocol.noise_batches)
+        ]
+        for expected in (*protocol.variances, "auto", "default")
+    }
 
 
 def regressions(protocol: Protocol, names: Sequence[str], shown: Sequence[str]) -> Plan:
     """Regressors on experiment 2, all whose libraries are installed; groups are ``baseline/features``."""
-    return {
-        f"{name}/{seen}": [_baseline(protocol, "regress", name, seen, run) for run in _comparing(protocol)]
-        for name in names or installed(REGRESSORS)
-        for seen in shown
-    }
+    return _compared(protocol, "regress", names or installed(REGRESSORS), shown)
 
 
 def classifications(
     protocol: Protocol, names: Sequence[str] = (), shown: Sequence[str] = ("thesis", "contact")
 ) -> Plan:
     """Classifiers on experiment 2; groups are ``baseline/features``."""
+    return _compared(protocol, "classify", names or installed(CLASSIFIERS), shown)
+
+
+_Kind: TypeAlias = Literal["regress", "classify"]
+
+
+def _compared(protocol: Protocol, kind: _Kind, names: Sequence[str], shown: Sequence[str]) -> Plan:
+    size = {"checkpoints": list(protocol.after(2)), "tests": protocol.tests()}
+    runs = protocol.runs(protocol.comparison_batches)
     return {
-        f"{name}/{seen}": [_baseline(protocol, "classify", name, seen, run) for run in _comparing(protocol)]
-        for name in names or installed(CLASSIFIERS)
+        f"{name}/{seen}": [
+            _baseline(kind, name, seen, run, setting_of(kind, name, seen), size) for run in runs
+        ]
+        for name in names
         for seen in shown
     }
 
 
-def _comparing(protocol: Protocol) -> Sequence[Batch]:
-    return protocol.runs(protocol.comparison_batches)
-
-
-def _baseline(
-    protocol: Protocol, function: Literal["regress", "classify"], name: str, seen: str, run: Batch
-) -> Task:
-    arguments = {
-        "baseline": name,
-        "shown": seen,
-        "experiment": 2,
-        "seed": run.seed,
-        "order": run.order,
-        "checkpoints": list(protocol.after(2)),
-        "tests": protocol.tests(),
-        "setting": setting_of(function, name, seen),
-    }
-    return Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}", LEARNER)
+def _baseline(kind: _Kind, name: str, seen: str, run: Batch, setting: int, size: Mapping[str, Any]) -> Task:
+    about = {"baseline": name, "shown": seen, "setting": setting, "experiment": 2}
+    arguments = {**about, "seed": run.seed, "order": run.order, **size}
+    return Task(f"{_ROOM}.comparison:{kind}", arguments, f"{name}, {seen}", LEARNER)
 
 
 def tunings(protocol: Protocol) -> Plan:
     """Every setting of every baseline on tuning seeds; groups are ``kind/baseline/features``."""
-    plan: dict[str, list[Task]] = {}
-    for function, known in (("regress", REGRESSORS), ("classify", CLASSIFIERS)):
-        for name in installed(known):
-            for seen in ("thesis", "contact"):
-                for number in range(len(known[name].settings)):
-                    arguments = {
-                        "baseline": name,
-                        "shown": seen,
-                        "experiment": 2,
-                        "seed": TUNING_SEEDS[0],
-                        "order": 0,
-                        "checkpoints": [protocol.tuning_episodes],
-                        "tests": {"seeds": [TUNING_TEST_SEED], "episodes": 12},
-                        "setting": number,
-                    }
-                    task = Task(f"{_ROOM}.comparison:{function}", arguments, f"{name}, {seen}", LEARNER)
-                    plan.setdefault(f"{function}/{name}/{seen}", []).append(task)
-    return plan
+    size = {
+        "checkpoints": [protocol.tuning_episodes],
+        "tests": {"seeds": [TUNING_TEST_SEED], "episodes": 12},
+    }
+    kinds: dict[_Kind, Mapping[str, Any]] = {"regress": REGRESSORS, "classify": CLASSIFIERS}
+    return {
+        f"{kind}/{name}/{seen}": [
+            _baseline(kind, name, seen, Batch(TUNING_SEEDS[0], 0), number, size)
+            for number in range(len(known[name].settings))
+        ]
+        for kind, known in kinds.items()
+        for name in installed(known)
+        for seen in ("thesis", "contact")
+    }

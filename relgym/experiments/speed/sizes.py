@@ -11,7 +11,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from typing import Any, Final
 
@@ -27,7 +26,6 @@ from relgym.scene.shapes import Box
 
 __all__ = [
     "WORLDS",
-    "SizeCost",
     "cost",
     "many_bodies",
     "many_constants",
@@ -91,36 +89,18 @@ WORLDS: Final[dict[str, tuple[Callable[[int], Iterator[Transition]], int]]] = {
 """What makes the transitions of each world, and of which size."""
 
 
-@dataclass(frozen=True, slots=True)
-class SizeCost:
-    """What learning cost in one world.
-
-    Attributes
-    ----------
-    steps
-        How many.
-    mean, worst
-        Processor time of a step, predicted and learned from, in ms.
-    memory
-        Peak memory of the process in MB, the making of the world included.
-    refused
-        What a typed error said; empty: nothing was refused.
-    """
-
-    steps: int
-    mean: float
-    worst: float
-    memory: float
-    refused: str = ""
-
-
-def cost(name: str) -> SizeCost:
+def cost(name: str) -> dict[str, Any]:
     """Learn in one world, in this process.
 
     Parameters
     ----------
     name
         Of `WORLDS`.
+
+    Returns
+    -------
+    How many ``steps``; ``mean`` and ``worst``, processor time of a step, predicted and learned from, in ms; ``memory``,
+    peak memory of the process in MB, the making of the world included; ``refused``, what a typed error said, or empty.
     """
     make, size = WORLDS[name]
     lesson = list(make(size))
@@ -136,10 +116,16 @@ def cost(name: str) -> SizeCost:
     except RelgymError as error:
         refused = str(error)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-    return SizeCost(len(spent), float(np.mean(spent or 0.0)), max(spent, default=0.0), peak, refused)
+    return {
+        "steps": len(spent),
+        "mean": float(np.mean(spent or 0.0)),
+        "worst": max(spent, default=0.0),
+        "memory": peak,
+        "refused": refused,
+    }
 
 
 def trial(*, world: str) -> dict[str, Any]:
     """`cost` in a process of its own, as a task for the store of results."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return asdict(pool.submit(cost, world).result())
+        return pool.submit(cost, world).result()

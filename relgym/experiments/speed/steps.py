@@ -7,16 +7,16 @@ run. MuJoCo's worlds need the extra ``bench-envs`` (`relgym benchmark speed step
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
 
 import relgym  # noqa: F401 - registers the envs
+from relgym.scene.objects import Float1D
 from relgym.wrappers import ModelLearner
 
-__all__ = ["HOME", "StepTimes", "step_times", "trial"]
+__all__ = ["HOME", "step_times", "trial"]
 
 HOME: Final = ("relgym/BallBoxRamp-v0", "relgym/TruckPush-v0", "CartPole-v1")
 
@@ -33,42 +33,7 @@ class _Clock(gym.Wrapper[Any, Any, Any, Any]):
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class StepTimes:
-    """Times of a run, in ms of processor time.
-
-    Attributes
-    ----------
-    env_id, seed
-        What was run.
-    learner
-        The learner's part of each step, shape ``(steps,)``.
-    env
-        The env's own step in the mean.
-    coverage, nrmse
-        Share of the latest predictions that are claimed, and how large their errors are (`Prequential`).
-    """
-
-    env_id: str
-    seed: int
-    learner: np.ndarray[tuple[int], np.dtype[np.float64]]
-    env: float
-    coverage: float
-    nrmse: float
-
-    def summary(self) -> dict[str, float]:
-        """Milliseconds of a step: the median of the last quarter, mean, 99th percentile, longest; and the rest."""
-        late = self.learner[-(len(self.learner) // 4 or 1) :]
-        return {
-            "late": float(np.median(late)),
-            "mean": float(self.learner.mean()),
-            "p99": float(np.percentile(self.learner, 99)),
-            "longest": float(self.learner.max()),
-            "env": self.env,
-        }
-
-
-def step_times(env_id: str, steps: int, *, seed: int = 0, **arguments: Any) -> StepTimes:
+def step_times(env_id: str, steps: int, *, seed: int = 0) -> tuple[Float1D, float]:
     """Learn from so many random steps of a world.
 
     Parameters
@@ -79,11 +44,13 @@ def step_times(env_id: str, steps: int, *, seed: int = 0, **arguments: Any) -> S
         How many, >= 1.
     seed
         Of the env and its actions.
-    arguments
-        Of `ModelLearner`.
+
+    Returns
+    -------
+    Milliseconds of processor time: the learner's part of each step, shape ``(steps,)``, and the env's in the mean.
     """
     clock = _Clock(gym.make(env_id))
-    learner = ModelLearner(clock, **arguments)
+    learner = ModelLearner(clock)
     learner.action_space.seed(seed)
     learner.reset(seed=seed)
     found = np.empty(steps)
@@ -93,11 +60,17 @@ def step_times(env_id: str, steps: int, *, seed: int = 0, **arguments: Any) -> S
         found[k] = 1e3 * (time.thread_time() - begin - (clock.spent - before))
         if terminated or truncated:
             learner.reset()
-    latest = learner.prequential
     learner.close()
-    return StepTimes(env_id, seed, found, 1e3 * clock.spent / steps, latest.coverage, latest.nrmse)
+    return found, 1e3 * clock.spent / steps
 
 
 def trial(*, world: str, steps: int, seed: int) -> dict[str, float]:
-    """`step_times` in short, as a task for the store of results."""
-    return step_times(world, steps, seed=seed).summary()
+    """Milliseconds of a step: the median of the last quarter, mean, 99th percentile, longest; and the env's own."""
+    learner, own = step_times(world, steps, seed=seed)
+    return {
+        "late": float(np.median(learner[-(len(learner) // 4 or 1) :])),
+        "mean": float(learner.mean()),
+        "p99": float(np.percentile(learner, 99)),
+        "longest": float(learner.max()),
+        "env": own,
+    }
