@@ -18,7 +18,7 @@ import argparse
 import json
 import shlex
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import date
 from pathlib import Path
@@ -38,6 +38,7 @@ __all__ = [
     "Option",
     "Shown",
     "Suite",
+    "kept",
     "made",
     "main",
     "page",
@@ -373,7 +374,7 @@ def page(suite: Suite, out: Path, target: Path) -> None:
     hand below the tables and in sections of other names.
     """
     sections = sections_of(target)
-    for one in _kept(suite, out):
+    for one in kept(suite.benchmarks, out):
         if one.figure:
             write_atomically(target.parent / one.figure, (out / one.figure).read_bytes())
         remark = sections.get(one.name, "").partition("\n```\n")[2].strip()
@@ -385,14 +386,21 @@ def page(suite: Suite, out: Path, target: Path) -> None:
     write_atomically(target, "\n\n".join(parts).encode() + b"\n")
 
 
-def _kept(suite: Suite, out: Path) -> Iterator[Made]:
-    for name in suite.benchmarks:
+def kept(names: Iterable[str], out: Path, mend: str = "delete it, and run {name} again") -> Iterator[Made]:
+    """What was made of these names, as far as a folder holds it; `mend` says what to do about a damaged file.
+
+    Raises
+    ------
+    StoreError
+        A file is damaged.
+    """
+    for name in names:
         path = out / f"{name}.json"
         if path.is_file():
             try:
                 yield Made(**json.loads(path.read_text(encoding="utf-8")))
             except (ValueError, TypeError) as error:
-                raise StoreError(f"{path} is damaged ({error}); delete it, and run {name} again") from error
+                raise StoreError(f"{path} is damaged ({error}); {mend.format(name=name)}") from error
 
 
 def main(suite: Suite, arguments: Sequence[str]) -> None:

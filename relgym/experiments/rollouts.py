@@ -71,13 +71,7 @@ def rollouts(model: SceneLearner, episodes: Sequence[Episode]) -> RolloutErrors:
     episodes
         Episodes of equal length, which the model hasn't learned from.
     """
-    errors, stopped = [], []
-    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
-        part = list(group)
-        off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
-        errors.append(off)
-        stopped.append(early)
-    largest, early = np.concatenate(errors), np.concatenate(stopped)
+    largest, early = _rolled(model, episodes)
     corner = np.array([bool(b.truth.corner.any()) for b in episodes])
     failed = early | (largest > STRAY)
     median = float(np.median(largest[~failed])) if (~failed).any() else float("nan")
@@ -94,12 +88,8 @@ def rollouts(model: SceneLearner, episodes: Sequence[Episode]) -> RolloutErrors:
 
 def largest_errors(model: SceneLearner, episodes: Sequence[Episode]) -> NDArray[np.float64]:
     """Largest position error of each episode's roll-out, in units; infinite where it stopped early."""
-    errors = []
-    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
-        part = list(group)
-        off, early = _roll(model, np.stack([b.vectors for b in part]), part[0].layout)
-        errors.append(np.where(early, np.inf, off))
-    return np.concatenate(errors)
+    largest, early = _rolled(model, episodes)
+    return np.where(early, np.inf, largest)
 
 
 def imagined(model: SceneLearner, vectors: Float2D, layout: SceneLayout) -> tuple[Float2D, int]:
@@ -117,6 +107,18 @@ def imagined(model: SceneLearner, vectors: Float2D, layout: SceneLayout) -> tupl
         result[k:] = step.vectors[0]
         result[k, given] = vectors[k, given]
     return result, len(vectors) - 1
+
+
+def _rolled(
+    model: SceneLearner, episodes: Sequence[Episode]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Largest position error of each episode's roll-out, and whether it stopped early."""
+    found = []
+    for _, group in groupby(episodes, key=lambda episode: episode.layout.names):
+        part = list(group)
+        found.append(_roll(model, np.stack([b.vectors for b in part]), part[0].layout))
+    largest, early = (np.concatenate(each) for each in zip(*found, strict=True))
+    return largest, early
 
 
 def _roll(

@@ -7,7 +7,7 @@ unsettled is counted apart, by its own residual (`relgym.experiments.bodies.worl
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from time import process_time
 from typing import Any, Final
 
@@ -22,10 +22,10 @@ from relgym.laws.learner import LawLearner
 from relgym.laws.text import law_rows
 from relgym.laws.touching import Contacts
 from relgym.model.learning.fitting import compare_and_learn
-from relgym.model.predicting.prediction import OUTCOMES, Outcome, ScenePrediction
+from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.world_model import WorldModel
 from relgym.scene.geometry.areas import mean_squares
-from relgym.scene.objects import Float2D, SceneLayout, Transition
+from relgym.scene.objects import Float2D, SceneLayout
 from relgym.scene.relations import Extractor
 
 __all__ = [
@@ -207,7 +207,10 @@ def watched(rooms: Iterable[Room], *, model: WorldModel | None = None) -> tuple[
         model = model or WorldModel(room.schema)
         for transition in room.transitions():
             said = model.predict_one(transition.before)
-            counts += _told_of(room, said, transition)
+            off = [abs(p.value - transition.after[p.object][p.property]) for p in said.parts]
+            names, claimed = [p.object for p in said.parts], [p.ok for p in said.parts]
+            before = transition.before.vector[None]
+            counts += _counted(room, before, names, np.array([claimed]), np.array([off]))
             compare_and_learn(model, transition, said)
     assert model is not None, "nothing to learn from"
     return model, Tally(*counts.tolist())
@@ -219,45 +222,29 @@ def asked(model: WorldModel, rooms: Iterable[Room]) -> Tally:
     for room in rooms:
         found = model.predict_batch(room.layout, room.vectors[:-1])
         columns = [room.layout.column(room.layout.index(name), prop) for name, prop in found.parts]
-        off = ~(np.abs(found.vectors - room.vectors[1:])[:, columns] <= EXACT)
+        off = np.abs(found.vectors - room.vectors[1:])[:, columns]
         claimed = found.outcomes == OUTCOMES.index(Outcome.PREDICTED)
-        touched = _touched(room, room.vectors[:-1])
-        names = [name for name, _ in found.parts]
-        for name in dict.fromkeys(names):
-            own = [k for k, other in enumerate(names) if other == name]
-            right, wrong = (claimed & ~off)[:, own].all(axis=1), (claimed & off)[:, own].any(axis=1)
-            here = touched[:, _place(room, name)]
-            counts += [
-                here.sum(), (here & right).sum(), (here & wrong).sum(), (~here).sum(), (~here & wrong).sum(),
-            ]  # fmt: skip
+        counts += _counted(room, room.vectors[:-1], [name for name, _ in found.parts], claimed, off)
     return Tally(*counts.tolist())
 
 
-def _touched(room: Room, vectors: Float2D) -> NDArray[np.bool_]:
-    """Which of a room's bodies touch something, shape ``(n, bodies)``."""
-    relations = Extractor(room.schema).extract(room.layout, vectors)
-    return np.asarray(relations.relation("intersect").any(axis=2))
+def _counted(
+    room: Room, before: Float2D, names: Sequence[str], claimed: NDArray[np.bool_], off: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """What `Tally` holds, of predictions of some steps: whose they are, which are claimed, by how much they are off.
 
-
-def _place(room: Room, name: str) -> int:
-    """Where a body stands among all that are touched."""
-    return room.layout.bodies.index(room.layout.index(name))
-
-
-def _told_of(room: Room, said: ScenePrediction, transition: Transition) -> NDArray[np.int64]:
-    """What `Tally` holds, of one prediction."""
-    touched = _touched(room, transition.before.vector[None])[0]
-    found = {part.object: [True, False] for part in said.parts}
-    for part in said.parts:
-        off = not abs(part.value - transition.after[part.object][part.property]) <= EXACT
-        found[part.object][0] &= part.ok and not off
-        found[part.object][1] |= part.ok and off
-    counts = np.zeros(5, dtype=np.int64)
-    for name, (right, wrong) in found.items():
-        if touched[_place(room, name)]:
-            counts += [1, right, wrong, 0, 0]
-        else:
-            counts += [0, 0, 0, 1, wrong]
+    `before` has shape ``(n, width)``, `claimed` and `off` ``(n, predictions)``.
+    """
+    relations = Extractor(room.schema).extract(room.layout, before)
+    touched = np.asarray(relations.relation("intersect").any(axis=2))
+    counts, bad = np.zeros(5, dtype=np.int64), ~(off <= EXACT)
+    for name in dict.fromkeys(names):
+        own = [k for k, other in enumerate(names) if other == name]
+        right, wrong = (claimed & ~bad)[:, own].all(axis=1), (claimed & bad)[:, own].any(axis=1)
+        here = touched[:, room.layout.bodies.index(room.layout.index(name))]
+        counts += [
+            here.sum(), (here & right).sum(), (here & wrong).sum(), (~here).sum(), (~here & wrong).sum(),
+        ]  # fmt: skip
     return counts
 
 
@@ -313,7 +300,7 @@ def law_trial(
         schema = fresh[0].schema
         book = learner.book.on(schema, schema.targets or ())
         told = tally(book, fresh, tolerance, [residual for _, residual in found] or None)
-        tallies.append(_listed(told))
+        tallies.append(list(astuple(told)))
         for room in fresh[:rolls]:
             errors += rolled(book, room, (0, 50, 99), 100).tolist()
             grown += rolled(book, room, (0, 50, 99), 100, nudge=NUDGE).tolist()
@@ -393,32 +380,19 @@ def model_trial(
         for transition in room.transitions():
             model.learn_one(transition)
     cost = 1e3 * (process_time() - started) / sum(map(len, later)) if later else None
-    right, wrong, count = 0, 0, 0
+    right = wrong = count = 0
     rooms = body_rooms(there, test_episodes, seed=TEST)
     for room in rooms:
         found = model.predict_batch(room.layout, room.vectors[:-1])
-        off = _off(room.layout, found.parts, found.vectors, room.vectors[1:])
-        right, wrong, count = (
-            right + int((found.ok & ~off).sum()),
-            wrong + int((found.ok & off).sum()),
-            count + len(off),
-        )
+        columns = [room.layout.column(room.layout.index(name), prop) for name, prop in found.parts]
+        off = np.abs(found.vectors - room.vectors[1:])[:, columns].max(axis=1) > EXACT
+        right += int((found.ok & ~off).sum())
+        wrong += int((found.ok & off).sum())
+        count += len(off)
     return {
-        "learning": _listed(told),
-        "fresh": _listed(asked(model, rooms)),
+        "learning": list(astuple(told)),
+        "fresh": list(astuple(asked(model, rooms))),
         "scenes": [100.0 * right / count, 100.0 * wrong / count],
         "cost": cost,
         "forces": sorted({str(force) for advice in model.advice() for force in advice.forces}),
     }
-
-
-def _listed(told: Tally) -> list[int]:
-    return [told.contacts, told.right, told.wrong, told.free, told.free_wrong, told.unsettled]
-
-
-def _off(
-    layout: SceneLayout, parts: Iterable[tuple[str, str]], found: Float2D, after: Float2D
-) -> NDArray[np.bool_]:
-    columns = [layout.column(layout.index(name), prop) for name, prop in parts]
-    off: NDArray[np.bool_] = np.abs(found - after)[:, columns].max(axis=1) > EXACT
-    return off

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from relgym.errors import StoreError
-from relgym.experiments.benchmark import Made, section, sections_of
+from relgym.experiments.benchmark import Made, kept, section, sections_of
 from relgym.experiments.chapter4.canvas import TITLES
 from relgym.experiments.chapter4.catalogue import JOBS
 from relgym.experiments.chapter4.job import Job, Shown
@@ -130,7 +130,7 @@ def page(out: Path, target: Path) -> list[str]:
     StoreError
         The folder holds no results.
     """
-    made = list(_made(out))
+    made = list(kept(JOBS, out, "run `relgym reproduce {name}` again"))
     if not made:
         raise StoreError(f"{out} holds no results: run `relgym reproduce NAME --out {out}` first")
     folder = target.with_suffix("")
@@ -144,19 +144,6 @@ def page(out: Path, target: Path) -> list[str]:
     text = "\n\n".join([_head(sections, folder), *sections, ""])
     write_atomically(target, declared(text, outdated(text)).encode())
     return [each.name for each in made]
-
-
-def _made(out: Path) -> Iterator[Made]:
-    for name in JOBS:
-        path = out / f"{name}.json"
-        if path.is_file():
-            try:
-                entry: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-                yield Made(**entry)
-            except (ValueError, TypeError) as error:
-                raise StoreError(
-                    f"{path} is damaged ({error}); run `relgym reproduce {name}` again"
-                ) from error
 
 
 def _head(sections: Sequence[str], folder: Path) -> str:

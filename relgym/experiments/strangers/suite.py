@@ -180,15 +180,11 @@ def _compared(
                 for baseline, said_there in baselines.items()
             },
         }
-        if hasattr(said, "probabilities"):
-            stated = said.probabilities[:, k]
-            known = np.isfinite(stated)
-            every.append((stated[known], ~off[known]))
-            width = said.intervals[:, k]
-            known = np.isfinite(width)
-            rows[f"{name}.{prop}"]["coverage"] = float(
-                (np.abs(error) <= np.maximum(width, rounding))[known].mean()
-            )
+        stated, width = said.probabilities[:, k], said.intervals[:, k]
+        known = np.isfinite(stated)
+        every.append((stated[known], ~off[known]))
+        inside = np.abs(error) <= np.maximum(width, rounding)
+        rows[f"{name}.{prop}"]["coverage"] = float(inside[np.isfinite(width)].mean())
     columns = {key: np.array([row[key] for row in rows.values()]) for key in next(iter(rows.values()))}
     summary = {key: float(np.mean(columns[key])) for key in ("claimed", "claimed_off", "claimed_off_own")}
     for baseline in baselines:
@@ -197,7 +193,7 @@ def _compared(
     summary |= {
         "persistence_worst": float(columns["persistence"].max()),
         "ece": _calibration_error(every),
-        "coverage": float(np.nanmean(columns["coverage"])) if "coverage" in columns else float("nan"),
+        "coverage": float(np.nanmean(columns["coverage"])),
     }
     return {**summary, "properties": rows}
 
@@ -227,8 +223,6 @@ def _ridge(training: Sequence[Transition], fresh: Sequence[Transition]) -> dict[
 
 
 def _calibration_error(every: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> float:
-    if not every:
-        return float("nan")
     stated, right = (np.concatenate(part) for part in zip(*every, strict=True))
     bins = np.minimum((10 * stated).astype(int), 9)
     shares = [
