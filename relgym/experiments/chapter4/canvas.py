@@ -19,6 +19,7 @@ __all__ = [
     "canvas",
     "error_axis",
     "first_case",
+    "legend",
     "mean_change",
     "save",
     "text_figure",
@@ -97,6 +98,11 @@ def above(value: float) -> float:
 def mean_change(panel: Any, change: float) -> None:
     """A dashed line at the mean magnitude of change: no model at all errs by so much."""
     panel.axhline(above(change), color="black", lw=0.8, ls="--", label="mean change")
+
+
+def legend(figure: Any, panel: Any, place: str, **options: Any) -> None:
+    """What the lines of a panel mean, once for all panels."""
+    figure.legend(*panel.get_legend_handles_labels(), loc=f"outside {place}", **options)
 
 
 def error_axis(panel: Any, *, label: bool = True) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, Final, TypeAlias
@@ -15,6 +15,7 @@ from relgym.experiments.chapter4.canvas import (
     above,
     canvas,
     error_axis,
+    legend,
     mean_change,
     save,
 )
@@ -34,6 +35,8 @@ __all__ = [
 
 _QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 _Score: TypeAlias = Mapping[str, Any]
+_Scores: TypeAlias = Mapping[str, Mapping[str, Mapping[int, _Score]]]
+"""By target, learner and number of training episodes."""
 
 
 def scores_by_episodes(runs: Sequence[Any], target: str, part: str = "all") -> dict[int, _Score]:
@@ -51,21 +54,11 @@ def pooled_as_told(scores: Sequence[_Score]) -> dict[str, Any]:
     return pooled_scores([{key: each[key] for key in scores[0] if key in told} for each in scores])
 
 
-def _axis(target: str) -> str:
-    return target[-1]
-
-
 # ------------------------------------------------------------------ figures 4.3, 4.12, 4.16
 def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     """95th percentile of the error over all test examples, and 99.9th: the former hides rare modes."""
     heading = ["target", "learner", "episodes", "p50", "p95", "p99.9", "mean change", "wrong %"]
-    found = {t: {name: scores_by_episodes(runs, t) for name, runs in values.items()} for t in targets}
-    lines: list[list[Cell]] = [
-        [target, TITLES[learner], episodes, *_figures(score)]
-        for target, learners in found.items()
-        for learner, scores in learners.items()
-        for episodes, score in scores.items()
-    ]
+    found = _found(values, targets)
 
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.2, 1, len(targets), sharey=True)
@@ -82,13 +75,27 @@ def accuracy_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown
                 )
             _dash(panel, next(iter(learners.values())))
             error_axis(panel, label=panel is panels[0][0])
-            panel.set(title=f"{_axis(target)} velocity", xlabel="training episodes")
-        handles, labels = panels[0][0].get_legend_handles_labels()
-        figure.legend(
-            handles, labels, loc="outside lower center", ncols=3 + 2 * (len(targets) > 1), fontsize=7
-        )
+            panel.set(title=f"{target[-1]} velocity", xlabel="training episodes")
+        legend(figure, panels[0][0], "lower center", ncols=3 + 2 * (len(targets) > 1), fontsize=7)
         save(figure, path)
 
+    return _listed(heading, found, _figures, draw)
+
+
+def _found(values: Values, targets: Sequence[str], part: str = "all") -> _Scores:
+    return {t: {name: scores_by_episodes(runs, t, part) for name, runs in values.items()} for t in targets}
+
+
+def _listed(
+    heading: list[str], found: _Scores, cells: Callable[[_Score], list[Cell]], draw: Callable[[Path], None]
+) -> Shown:
+    """A line for each target, learner and number of episodes."""
+    lines: list[list[Cell]] = [
+        [target, TITLES[learner], episodes, *cells(score)]
+        for target, learners in found.items()
+        for learner, scores in learners.items()
+        for episodes, score in scores.items()
+    ]
     return Shown(table(heading, lines), [heading, *lines], draw)
 
 
@@ -129,8 +136,7 @@ def by_mode_shown(_: Protocol, values: Values, target: str) -> Shown:
             panel.set_axis_off()
         figure.supxlabel("training episodes", fontsize=9)
         figure.supylabel(ERROR, fontsize=9)
-        handles, labels = panels.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=8)
+        legend(figure, panels.flat[0], "upper center", ncols=5, fontsize=8)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)
@@ -147,10 +153,9 @@ def _short(name: str, names: Sequence[str]) -> str:
 def _by_mode(runs: Sequence[Any], target: str) -> dict[str, dict[int, _Score]]:
     """Pooled scores by true mode and number of training episodes."""
     found: dict[str, dict[int, list[_Score]]] = {}
-    for run in runs:
-        for each in run["scores"]:
-            for score in each["targets"][target]["modes"]:
-                found.setdefault(score["name"], {}).setdefault(each["episodes"], []).append(score)
+    for each in (each for run in runs for each in run["scores"]):
+        for score in each["targets"][target]["modes"]:
+            found.setdefault(score["name"], {}).setdefault(each["episodes"], []).append(score)
     return {
         name: {episodes: pooled_as_told(scores) for episodes, scores in by_episodes.items()}
         for name, by_episodes in found.items()
@@ -189,23 +194,17 @@ def _box(errors: Any) -> dict[str, Any]:
 def rates_shown(_: Protocol, values: Values, targets: Sequence[str]) -> Shown:
     """Shares of wrong predictions, split: the mode wasn't learned, or it was and another one was chosen."""
     heading = ["target", "learner", "episodes", "wrong %", "not learned %", "misclassified %"]
-    found = {t: {n: scores_by_episodes(runs, t, "counted") for n, runs in values.items()} for t in targets}
-    lines: list[list[Cell]] = [
-        [target, TITLES[learner], episodes, *_split(score)]
-        for target, learners in found.items()
-        for learner, scores in learners.items()
-        for episodes, score in scores.items()
-    ]
+    found = _found(values, targets, "counted")
 
     def draw(path: Path) -> None:
         figure, panels = canvas(5.5 * len(targets), 4.0, 1, len(targets))
         for panel, (target, learners) in zip(panels[0], found.items(), strict=True):
             _rates_drawn(panel, learners)
-            panel.set(title=f"{_axis(target)} velocity", xlabel="training episodes", ylabel="wrong, %")
+            panel.set(title=f"{target[-1]} velocity", xlabel="training episodes", ylabel="wrong, %")
         panels[0][-1].legend(fontsize=7)
         save(figure, path)
 
-    return Shown(table(heading, lines), [heading, *lines], draw)
+    return _listed(heading, found, _split, draw)
 
 
 def _split(score: _Score) -> list[Cell]:
@@ -240,14 +239,8 @@ def perfect_shown(_: Protocol, values: Values, target: str, mode: str) -> Shown:
     found = {}
     for learner, runs in values.items():
         modes = _by_mode(runs, target)
-        found[learner] = next(
-            (
-                s
-                for name, s in modes.items()
-                if name.split(", ")[0] == mode and all("best" in x for x in s.values())
-            ),
-            {},
-        )
+        known = (s for name, s in modes.items() if name.split(", ")[0] == mode)
+        found[learner] = next((s for s in known if all("best" in x for x in s.values())), {})
     heading = ["learner", "episodes", "chosen p50", "chosen p75", "best p50", "best p75", "best p95"]
     lines: list[list[Cell]] = []
     for learner, scores in found.items():

@@ -8,7 +8,16 @@ from statistics import mean
 from typing import Any, Final
 
 from relgym.baselines.catalogue import CLASSIFIERS, REGRESSORS
-from relgym.experiments.chapter4.canvas import COLOURS, TITLES, above, canvas, error_axis, mean_change, save
+from relgym.experiments.chapter4.canvas import (
+    COLOURS,
+    TITLES,
+    above,
+    canvas,
+    error_axis,
+    legend,
+    mean_change,
+    save,
+)
 from relgym.experiments.chapter4.figures_accuracy import scores_by_episodes
 from relgym.experiments.chapter4.job import Shown, Values
 from relgym.experiments.chapter4.protocol import Protocol
@@ -55,7 +64,7 @@ def _draw_lwr(path: Path, found: Mapping[str, Mapping[int, Any]]) -> None:
     mean_change(panel, last["change"] / last["examples"])
     error_axis(panel)
     panel.set_xlabel("training episodes")
-    figure.legend(*panel.get_legend_handles_labels(), loc="outside right center", fontsize=8)
+    legend(figure, panel, "right center", fontsize=8)
     save(figure, path)
 
 
@@ -92,8 +101,7 @@ def classifiers_shown(protocol: Protocol, values: Values) -> Shown:
             _lines(panel, {group: found[target] for group, found in rates.items()})
             panel.set(title=f"{target[-1]} velocity", xlabel="training episodes")
         panels[0][0].set_ylabel("wrong, %")
-        handles, labels = panels[0][0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside right center", fontsize=7)
+        legend(figure, panels[0][0], "right center", fontsize=7)
         save(figure, path)
 
     return Shown(table(heading, lines), [heading, *lines], draw)

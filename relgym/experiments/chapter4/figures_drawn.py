@@ -51,10 +51,9 @@ def layouts_shown(_: Protocol, __: Values) -> Shown:
     }
     names = sorted(episodes)
     heading = ["configuration", "stacks, from the truck on"]
-    lines: list[list[Cell]] = [[name, str(episodes[name].truth.mode_names["truck.vx"])] for name in names]
-    for line, name in zip(lines, names, strict=True):
-        truth = episodes[name].truth
-        line[1] = truth.mode_names["truck.vx"][int(truth.mode["truck.vx"][0])]
+    truths = [episodes[name].truth for name in names]
+    stacks = [truth.mode_names["truck.vx"][int(truth.mode["truck.vx"][0])] for truth in truths]
+    lines: list[list[Cell]] = [[name, told] for name, told in zip(names, stacks, strict=True)]
 
     def draw(path: Path) -> None:
         figure, panels = canvas(3.2 * len(names), 2.6, 1, len(names))

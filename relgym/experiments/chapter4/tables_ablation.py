@@ -19,18 +19,10 @@ __all__ = ["ablation_shown"]
 
 def ablation_shown(_: Protocol, values: Values) -> Shown:
     """Rates of wrong predictions at the end of experiments 1 and 2; groups are ``experiment/learner``."""
-    heading = [
-        "experiment",
-        "target",
-        "learner",
-        "wrong %",
-        "strict %",
-        "ties too %",
-        "printed range %",
-        "inside",
-        "upright %",
-        "most of it",
-    ]
+    heading = (
+        "experiment, target, learner, wrong %, strict %, "
+        "ties too %, printed range %, inside, upright %, most of it"
+    ).split(", ")
     lines: list[list[Cell]] = []
     for group, runs in values.items():
         experiment, learner = group.split("/")

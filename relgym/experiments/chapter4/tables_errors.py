@@ -142,18 +142,10 @@ def _failed(trials: Sequence[Mapping[str, Any]], key: str | None, stray: float) 
 
 def rates_shown(_: Protocol, values: Values) -> Shown:
     """All learners at the end of experiments 1 and 2; groups are ``experiment/learner``."""
-    heading = [
-        "experiment",
-        "target",
-        "learner",
-        "wrong %",
-        "not learned %",
-        "misclassified %",
-        "strict %",
-        "p95",
-        "p99.9",
-        "printed range %",
-    ]
+    heading = (
+        "experiment, target, learner, wrong %, not learned %, "
+        "misclassified %, strict %, p95, p99.9, printed range %"
+    ).split(", ")
     lines = []
     for group, runs in values.items():
         experiment, learner = group.split("/")

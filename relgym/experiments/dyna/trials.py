@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -45,7 +46,7 @@ def learning(
         steps=steps,
         change=altered,
         to_the_end=altered is not None,
-        heard=_Heard(f"{course}, {arm}, seed {seed}"),
+        heard=partial(_heard, f"{course}, {arm}, seed {seed}"),
     )
     return asdict(found)
 
@@ -66,7 +67,7 @@ def misled(*, course: str, arm: str, seed: int, steps: int, arguments: Mapping[s
     """
     place = COURSES[course]
     model, right = _of_another_world(place, dict(arguments), seed)
-    heard = _Heard(f"{course}, {arm} with a wrong model, seed {seed}")
+    heard = partial(_heard, f"{course}, {arm} with a wrong model, seed {seed}")
     found = run(place, ARMS[arm], seed=seed, steps=steps, model=model, to_the_end=True, heard=heard)
     return {"run": asdict(found), "right_there": right}
 
@@ -108,11 +109,6 @@ def _random_steps(env: Any, steps: int, seed: int) -> list[Any]:
     return found[:steps]
 
 
-class _Heard:
-    """Says on standard error how a run stands."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-
-    def __call__(self, at: int, good: int) -> None:
-        print(f"{self._what}: {good} of {EPISODES} after {at:,}", file=sys.stderr, flush=True)
+def _heard(what: str, at: int, good: int) -> None:
+    """Say on standard error how a run stands."""
+    print(f"{what}: {good} of {EPISODES} after {at:,}", file=sys.stderr, flush=True)

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from relgym.experiments.criterion import Measure, measured
-from relgym.experiments.laws.score import SEEDS, taught
+from relgym.experiments.laws.score import SEEDS, laws_of, taught
 from relgym.experiments.laws.trials import trial_rooms
 from relgym.experiments.laws.worlds import Ball, World
 from relgym.laws.book import LawBook
@@ -46,8 +46,7 @@ def on_the_floor(touching: int, objects: int) -> tuple[World, SceneLayout, Float
 
 def scaling(repeats: int = 200) -> list[Measure]:
     """Times of a step by laws alone, the relations being known: eight pairs against two, 60 objects against 12."""
-    book = taught(trial_rooms(World(2), 10, seed=SEEDS[0])).laws
-    assert book is not None, "frames='auto' learns laws"
+    book = laws_of(taught(trial_rooms(World(2), 10, seed=SEEDS[0])))
     few, many, large = (
         _seconds(book, pairs, objects, repeats)
         for pairs, objects in ((_FEW, _SMALL), (_MANY, _SMALL), (_FEW, _LARGE))

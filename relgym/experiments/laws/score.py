@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -18,7 +17,7 @@ from relgym.laws.touching import Contacts
 from relgym.model.world_model import WorldModel
 from relgym.scene.relations import Extractor
 
-__all__ = ["SEEDS", "TESTS", "WRONG", "Part", "Score", "score", "score_laws", "taught"]
+__all__ = ["SEEDS", "TESTS", "WRONG", "Part", "Score", "laws_of", "score", "score_laws", "taught"]
 
 WRONG: Final = 1e-9
 """A velocity component off by more than this is wrong."""
@@ -55,14 +54,13 @@ class Score:
 def score(model: WorldModel, parts: Iterable[Part]) -> Score:
     """Let a model predict every transition one step ahead."""
     total = wrong = abstained = 0
-    for layout, group in groupby(parts, key=lambda part: part.layout):
-        for part in group:
-            found = model.predict_batch(layout, part.vectors[:-1])
-            columns = [layout.column(layout.index(name), prop) for name, prop in found.parts]
-            off = np.abs(found.vectors[:, columns] - part.vectors[1:, columns]).max(axis=1) > WRONG
-            total += len(off)
-            wrong += int((off & found.ok).sum())
-            abstained += int((~found.ok).sum())
+    for part in parts:
+        found = model.predict_batch(part.layout, part.vectors[:-1])
+        columns = [part.layout.column(part.layout.index(name), prop) for name, prop in found.parts]
+        off = np.abs(found.vectors[:, columns] - part.vectors[1:, columns]).max(axis=1) > WRONG
+        total += len(off)
+        wrong += int((off & found.ok).sum())
+        abstained += int((~found.ok).sum())
     return Score(total, wrong, abstained)
 
 
@@ -99,3 +97,9 @@ def taught(
                 model.learn_one(transition)
     assert model is not None, "nothing to learn from, no schema"
     return model
+
+
+def laws_of(model: WorldModel) -> LawBook:
+    """The laws of motion that a model learned."""
+    assert model.laws is not None, "frames='auto' learns laws"
+    return model.laws

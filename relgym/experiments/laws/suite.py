@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.experiments.benchmark import Shown, Suite, whole
-from relgym.experiments.criterion import measured
+from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.data import BALL_EXPERIMENTS, BallExperiment, ball_episodes, truck_episodes
 from relgym.experiments.laws.classic import CLASSICS, Classic, classic_transitions
 from relgym.experiments.laws.scaling import scaling
-from relgym.experiments.laws.score import SEEDS, TESTS, Part, score, taught
+from relgym.experiments.laws.score import SEEDS, TESTS, Part, Score, score, taught
 from relgym.experiments.laws.trials import inexpressible, noise, other_worlds
 from relgym.experiments.rollouts import largest_errors
 from relgym.experiments.rooms import rooms
@@ -30,6 +30,14 @@ from relgym.scene.schema import SceneSchema
 __all__ = ["SUITE", "part"]
 
 
+def _both(name: str, scores: Sequence[Score], total: str, abstained: float = 0) -> list[Measure]:
+    """Wrong predictions, and those that were not made; of the latter so many are allowed."""
+    return [
+        measured(f"{name} wrong of {total}", 0, [s.wrong for s in scores]),
+        measured(f"{name} abstained of {total}", abstained, [s.abstained for s in scores]),
+    ]
+
+
 def _one_step(seeds: Sequence[int]) -> Shown:
     measures, notes = [], []
     for experiment in (1, 2):
@@ -39,11 +47,7 @@ def _one_step(seeds: Sequence[int]) -> Shown:
             model = taught(ball_episodes(experiment, seed=seed))
             scores += [score(model, ball_episodes(experiment, seed=test, test=True)) for test in TESTS]
             sentences.add(len(report_of(model).laws))
-        for name, values in (
-            ("wrong", [s.wrong for s in scores]),
-            ("abstained", [s.abstained for s in scores]),
-        ):
-            measures.append(measured(f"experiment {experiment}: {name} of 24,000", 0, values))
+        measures += _both(f"experiment {experiment}:", scores, "24,000")
         measures.append(measured(f"experiment {experiment}: sentences", 3, sorted(sentences)))
         notes.append(
             model.describe(details=True, frame="world", incline=BALL_EXPERIMENTS[experiment].incline)
@@ -94,9 +98,7 @@ def _rooms(seeds: Sequence[int]) -> Shown:
                     steps=400,
                 )
                 values.append(score(model, found))
-            name = f"laws of {experiment}, {objects} objects"
-            measures.append(measured(f"{name}: wrong of {400 * count}", 0, [s.wrong for s in values]))
-            measures.append(measured(f"{name}: abstained of {400 * count}", 0, [s.abstained for s in values]))
+            measures += _both(f"laws of {experiment}, {objects} objects:", values, f"{400 * count}")
     return Shown([*measures, *scaling()])
 
 
@@ -111,10 +113,11 @@ def _parts_of_the_world(seeds: Sequence[int]) -> Shown:
                 )
                 for seed in seeds
             ]
-            name = f"experiment {experiment}, contacts with {kind}s only:"
-            measures.append(measured(f"{name} wrong of 24,000", 0, [s.wrong for s in found]))
-            limit = 0 if kind == "floor" else 24_000
-            measures.append(measured(f"{name} abstained of 24,000", limit, [s.abstained for s in found]))
+            name, most = (
+                f"experiment {experiment}, contacts with {kind}s only:",
+                0 if kind == "floor" else 24_000,
+            )
+            measures += _both(name, found, "24,000", most)
     return Shown(measures)
 
 

@@ -13,7 +13,7 @@ from relgym.experiments.criterion import Measure, measured
 from relgym.experiments.data import BALL_EXPERIMENTS, ball_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.laws.motion import episode
-from relgym.experiments.laws.score import TESTS, score, score_laws, taught
+from relgym.experiments.laws.score import TESTS, laws_of, score, score_laws, taught
 from relgym.experiments.laws.worlds import Ball, Material, World
 from relgym.experiments.rooms import Room
 from relgym.laws.book import LawBook
@@ -146,8 +146,7 @@ def other_worlds(seeds: Sequence[int], train: int = 40, test: int = 20) -> Shown
         missed, shares = [], []
         for seed in seeds:
             model = taught(trial_rooms(trial.world, train, seed=seed))
-            assert model.laws is not None, "frames='auto' learns laws"
-            frame, found = _formulas(model.laws)
+            frame, found = _formulas(laws_of(model))
             missed.append(len(found ^ trial.laws) + (frame != trial.frame))
             shares.append(100.0 * score(model, trial_rooms(trial.world, test, seed=TESTS[0])).share)
         measures.append(measured(f"{trial.name}: laws missed or invented", 0, missed))
@@ -162,9 +161,7 @@ def transplanted(seed: int, train: int = 40, test: int = 20) -> float:
     """Share of wrong predictions in space, by free flight in space and contacts in the plane alone."""
     plane = World(2, materials={"block": _ROUGH})
     space = TRIALS[0].world
-    below, above = (taught(trial_rooms(w, train, seed=seed)).laws for w in (plane, space))
-    assert below is not None, "frames='auto' learns laws"
-    assert above is not None, "frames='auto' learns laws"
+    below, above = (laws_of(taught(trial_rooms(w, train, seed=seed))) for w in (plane, space))
     above.pair = below.pair
     above.forget()
     return score_laws(above, trial_rooms(space, test, seed=TESTS[0])).share
@@ -195,11 +192,10 @@ def noise(seeds: Sequence[int], episodes: int = 24) -> Shown:
             frames = []
             for seed in seeds:
                 parts = list(ball_episodes(experiment, seed=seed, episodes=episodes))
-                model = taught(noisy(parts, sd, rng=np.random.default_rng([seed, 1])))
-                assert model.laws is not None, "frames='auto' learns laws"
-                frames.append(_formulas(model.laws)[0] != "contact")
+                book = laws_of(taught(noisy(parts, sd, rng=np.random.default_rng([seed, 1]))))
+                frames.append(_formulas(book)[0] != "contact")
                 for name, values in off.items():
-                    values.append(100.0 * abs(constants(model.laws).get(name, 0.0) / truth[name] - 1.0))
+                    values.append(100.0 * abs(constants(book).get(name, 0.0) / truth[name] - 1.0))
             title = f"experiment {experiment}, sd {sd:g}"
             measures.append(measured(f"{title}: other frames", 0, frames))
             measures += [measured(f"{title}: weight of {n} off by, %", 1.0, v) for n, v in off.items()]
@@ -225,8 +221,7 @@ def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Show
         for seed in seeds:
             model = taught(trial_rooms(world, train, seed=seed))
             fresh = trial_rooms(world, test, seed=TESTS[0])
-            assert model.laws is not None, "frames='auto' learns laws"
-            laws.append(score_laws(model.laws, fresh))
+            laws.append(score_laws(laws_of(model), fresh))
             models.append(score(model, fresh))
         total = laws[0].transitions
         measures.append(measured(f"{name}: laws wrong of {total:,}", 0, [s.wrong for s in laws]))
