@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.experiments.fresh import FreshEpisode
-from relgym.experiments.rollouts import STRAY, outside
+from relgym.experiments.rollouts import STRAY, outside, positions
+from relgym.experiments.scores import short
 from relgym.model.predicting.prediction import OUTCOMES, BatchPrediction, Outcome
 from relgym.model.reports.text import Cell, amount, table
 from relgym.model.world_model import WorldModel
@@ -94,7 +95,7 @@ class Horizons:
             f"{self.kept} of {amount(self.trials, 'roll-out')} of up to {amount(self.longest, 'step')} stay with the "
             f"real episode to its end."
         )
-        rows: list[list[Cell]] = [[p.name, _short(p.spread), *map(_short, p.rmse)] for p in self.properties]
+        rows: list[list[Cell]] = [[p.name, short(p.spread), *map(short, p.rmse)] for p in self.properties]
         rows.append(["roll-outs", "", *self.reached])
         heading = ["RMSE after", "spread", *(amount(n, "step") for n in self.after)]
         notes = [
@@ -161,7 +162,9 @@ def _roll(model: WorldModel, found: Sequence[FreshEpisode]) -> list[_Roll]:
     now = np.stack([e.before[0].vector for e in found])
     given = outside(layout)
     own = _compared(model, layout)
-    task = [c for i, t in enumerate(layout.types) if t.name == TASK for c in _all(layout, i)]
+    task = [
+        layout.column(i, prop) for i, t in enumerate(layout.types) if t.name == TASK for prop in t.properties
+    ]
     errors: list[list[NDArray[np.float64]]] = [[] for _ in found]
     lacking: dict[int, tuple[str, ...]] = {}
     going = np.array([k for k, n in enumerate(lengths) if n], dtype=np.intp)
@@ -188,7 +191,7 @@ def _roll(model: WorldModel, found: Sequence[FreshEpisode]) -> list[_Roll]:
             now[k, given] = found[k].before[step].vector[given]
             now[k, task] = 0.0
     names = tuple(f"{layout.types[i].name}.{prop}" for i, prop, _ in own)
-    places = tuple(k for k, (i, prop, _) in enumerate(own) if prop in _position_names(layout, i))
+    places = tuple(k for k, column in enumerate(columns) if column in positions(layout))
     return [
         _Roll(names, places, r, np.reshape(e, (len(e), len(own))), n, lacking.get(k, ()))
         for k, (r, e, n) in enumerate(zip(real, errors, lengths, strict=True))
@@ -234,17 +237,6 @@ def _values(
     return np.array([after.vector[there.column(there.index(layout.names[i]), prop)] for i, prop, _ in own])
 
 
-def _all(layout: SceneLayout, index: int) -> list[int]:
-    return [layout.column(index, prop) for prop in layout.types[index].properties]
-
-
-def _position_names(layout: SceneLayout, index: int) -> set[str]:
-    kind = layout.types[index]
-    if index not in layout.bodies:
-        return set()
-    return {kind.properties[k] for k in kind.pose_columns()[:3] if k >= 0}
-
-
 def _spreads(rolls: Sequence[_Roll]) -> dict[str, float]:
     values: dict[str, list[NDArray[np.float64]]] = {}
     for roll in rolls:
@@ -271,7 +263,3 @@ def _rmse(rolls: Sequence[_Roll], name: str, step: int) -> float:
         if own == name
     ]
     return float(np.sqrt(np.square(found).mean())) if found else math.nan
-
-
-def _short(value: float) -> Cell:
-    return "" if math.isnan(value) else float(f"{value:.2g}")

@@ -14,7 +14,7 @@ from relgym.model.protocol import SceneLearner
 from relgym.model.reports.text import Cell, table
 from relgym.scene.objects import ACTION, Float2D, SceneLayout
 
-__all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "outside", "rollouts"]
+__all__ = ["STRAY", "RolloutErrors", "imagined", "largest_errors", "outside", "positions", "rollouts"]
 
 STRAY = 1e-2
 """A roll-out has failed when a position is off by more than this at some step, in units."""
@@ -128,7 +128,7 @@ def _roll(
 
     `truth` has shape ``(trials, steps + 1, width)``.
     """
-    given, places = outside(layout), _positions(layout)
+    given, places = outside(layout), positions(layout)
     now = truth[:, 0].copy()
     largest, stopped = np.zeros(len(truth)), np.zeros(len(truth), dtype=np.bool_)
     for k in range(1, truth.shape[1]):
@@ -154,7 +154,7 @@ def outside(layout: SceneLayout) -> list[int]:
     ]
 
 
-def _positions(layout: SceneLayout) -> list[int]:
+def positions(layout: SceneLayout) -> list[int]:
     """Columns of all bodies' positions."""
     return [
         layout.offsets[i] + k for i in layout.bodies for k in layout.types[i].pose_columns()[:3] if k >= 0

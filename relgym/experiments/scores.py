@@ -16,7 +16,7 @@ from relgym.model.target.hindsight import WRONG
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
-__all__ = ["Score", "TargetScore", "score"]
+__all__ = ["Score", "TargetScore", "score", "short"]
 
 _CHUNK = 2000
 """Scenes predicted at once: their relations need some 10 kB each."""
@@ -81,7 +81,7 @@ class Score:
         if not self.targets:
             return f"{self.steps:,} fresh steps, and nothing to predict: nothing has been learned yet"
         rows: list[list[Cell]] = [
-            [t.target, t.predictions, t.wrong, t.missing, *map(_short, (t.rmse, t.largest)), _share(t.r2)]
+            [t.target, t.predictions, t.wrong, t.missing, *map(short, (t.rmse, t.largest)), _share(t.r2)]
             for t in self.targets
         ]
         heading = ["target", "predictions", "wrong", "none", "RMSE", "largest", "R²"]
@@ -175,7 +175,8 @@ def _target_score(target: str, rows: NDArray[np.float64]) -> TargetScore:
     )
 
 
-def _short(value: float) -> Cell:
+def short(value: float) -> Cell:
+    """Two digits; nothing of NaN."""
     return "" if math.isnan(value) else float(f"{value:.2g}")
 
 

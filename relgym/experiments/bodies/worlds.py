@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -58,6 +58,9 @@ SHAPES: Final[Mapping[str, Shape]] = {
 
 ROOM: Final = 2.0
 """Half the width of the room between the walls."""
+
+SWEEPS: Final = 10_000
+"""Of the engine: two points close to each other settle slowly; 1,000 leave some of them 1e-5 off."""
 
 _PARENT = "pushed"
 
@@ -114,11 +117,6 @@ class Setting:
     heavy: float = 1.0
     materials: tuple[float, ...] = ()
     tilt: float = 0.0
-
-    @property
-    def iterations(self) -> int:
-        """Sweeps of the engine: two points close to each other settle slowly; 1,000 leave some of them 1e-5 off."""
-        return 10_000
 
 
 def body_schema(setting: Setting) -> SceneSchema:
@@ -204,7 +202,7 @@ def _episode(
     """State vectors, and what `sweeps` times as many sweeps of the engine change of each step."""
     bodies = _bodies(setting, densities, rng=rng)
     worlds = [
-        BodyWorld(bodies, gravity=setting.gravity, damping=setting.damping, iterations=k * setting.iterations)
+        BodyWorld(bodies, gravity=setting.gravity, damping=setting.damping, iterations=k * SWEEPS)
         for k in dict.fromkeys((1, sweeps))
     ]
     world = worlds[0]
@@ -248,15 +246,7 @@ def _bodies(setting: Setting, densities: Array, *, rng: np.random.Generator) -> 
         grip = setting.materials[k % len(setting.materials)] if setting.materials else friction
         found.append(Body(shape, extents, mass, elasticity=elasticity, friction=grip))
     still = Body(Box(), (2.0 * ROOM + 2.0, 1.0), math.inf, elasticity=elasticity, friction=friction)
-    belt = Body(
-        Box(),
-        (2.0 * ROOM + 2.0, 1.0),
-        math.inf,
-        surface=setting.conveyor,
-        elasticity=elasticity,
-        friction=friction,
-    )
-    return [*found, belt, still, still, still]
+    return [*found, replace(still, surface=setting.conveyor), still, still, still]
 
 
 _WALLS: Final = np.array(

@@ -16,7 +16,6 @@ from relgym.experiments.chapter4 import (
     figures_trees,
     frequencies,
     plans,
-    tables_ablation,
     tables_baselines,
     tables_clauses,
     tables_errors,
@@ -230,7 +229,7 @@ _ALL: Final = (
         "rates": ("All learners beside the thesis' rates", tables_errors.rates_shown),
     }),
     *_of("4.3.4, §4.4.4", "beyond", plans.ablations, {
-        "ablation": ("Why the original program's rates are what they are", tables_ablation.ablation_shown),
+        "ablation": ("Why the original program's rates are what they are", tables_errors.ablation_shown),
     }),
     *_of("4.7", "beyond", _regressors((), "thesis", "contact"), {
         "baselines": ("All baselines at equal features", tables_baselines.headline_shown),

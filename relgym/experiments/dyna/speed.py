@@ -17,6 +17,7 @@ from relgym.config import ModelConfig
 from relgym.envs import LearnedModelVectorEnv, drawn_from
 from relgym.experiments.data import ball_episodes
 from relgym.experiments.seeds import TUNING_SEEDS, TUNING_TEST_SEED
+from relgym.experiments.worlds.online import learned
 from relgym.model.running.compiled import KERNEL
 from relgym.model.world_model import WorldModel
 from relgym.wrappers import ModelLearner
@@ -93,13 +94,8 @@ def _truck_model() -> WorldModel:
 @cache
 def _ball_model(frames: str) -> WorldModel:
     """A ball among six bodies, watched for 12,000 steps."""
-    episodes = list(ball_episodes(1, seed=TUNING_SEEDS[0], episodes=60))
-    model = WorldModel(episodes[0].schema, ModelConfig(frames=frames))  # type: ignore[arg-type]
-    for episode in episodes:
-        for transition in episode.transitions():
-            model.learn_one(transition)
-    model.finish()
-    return model
+    episodes = ball_episodes(1, seed=TUNING_SEEDS[0], episodes=60)
+    return learned(episodes, config=ModelConfig(frames=frames))  # type: ignore[arg-type]
 
 
 def _truck_dreams() -> LearnedModelVectorEnv:

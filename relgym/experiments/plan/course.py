@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from time import process_time
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -36,6 +36,7 @@ __all__ = [
     "ceiling",
     "knowing",
     "learning",
+    "played",
     "recovering",
 ]
 
@@ -171,6 +172,29 @@ ARMS: Final = {
 }
 
 
+class Played(NamedTuple):
+    """How an episode ended, how many decisions it took, and processor time to choose them."""
+
+    seen: Any
+    info: dict[str, Any]
+    decisions: int
+    seconds: float
+
+
+def played(env: gym.Env[Any, Any], predict: Callable[[Any, Any], tuple[Any, Any]], seed: int) -> Played:
+    """Play one episode: an agent predicts its action, and its next state, from an observation and its state."""
+    seen, info = env.reset(seed=seed)
+    state, over, decisions, seconds = None, False, 0, 0.0
+    while not over:
+        started = process_time()
+        action, state = predict(seen, state)
+        seconds += process_time() - started
+        decisions += 1
+        seen, _, terminated, truncated, info = env.step(action)
+        over = bool(terminated or truncated)
+    return Played(seen, info, decisions, seconds)
+
+
 class Tests:
     """Fixed episodes, one after the other.
 
@@ -204,17 +228,9 @@ class Tests:
         """How many episodes the agent ends well, and of how many; ``info["is_success"]`` at the end counts."""
         good = 0
         for k in range(self._episodes):
-            seen, _ = self._env.reset(seed=_FIRST_EPISODE + self._first + k)
-            state, over = None, False
-            info: dict[str, Any] = {}
-            while not over:
-                started = process_time()
-                action, state = agent.predict(seen, state)
-                self.seconds += process_time() - started
-                self.decisions += 1
-                seen, _, terminated, truncated, info = self._env.step(action)
-                over = terminated or truncated
-            good += bool(info["is_success"])
+            episode = played(self._env, agent.predict, _FIRST_EPISODE + self._first + k)
+            self.decisions, self.seconds = self.decisions + episode.decisions, self.seconds + episode.seconds
+            good += bool(episode.info["is_success"])
             if k + 1 - good > self._failures:
                 return good, k + 1
         return good, self._episodes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from relgym.envs.tasks import RewardFunctions, TaskOutcome
 from relgym.errors import ConfigError
+from relgym.experiments.plan.course import played
 from relgym.planning import CrossEntropy, ModelSimulator, Objective, Planner, TreeSearch
 from relgym.planning.sequences import Search
 from relgym.scene.objects import Float2D, SceneLayout
@@ -126,20 +128,10 @@ FOREIGN: Final = {
 
 def _solved(place: Foreign, agent: Any, episodes: int) -> tuple[int, float]:
     """Successes of 100, and processor time of a decision."""
-    env = gym.make(place.env_id)
-    good, decisions, seconds = 0, 0, 0.0
-    for k in range(episodes):
-        seen, _ = env.reset(seed=_FIRST + k)
-        state, over = None, False
-        while not over:
-            started = process_time()
-            action, state = agent.predict(seen, state, deterministic=True)
-            seconds += process_time() - started
-            seen, _, terminated, truncated, _ = env.step(action)
-            decisions += 1
-            over = terminated or truncated
-        good += place.good(seen)
-    return round(100 * good / episodes), seconds / decisions
+    env, predict = gym.make(place.env_id), partial(agent.predict, deterministic=True)
+    each = [played(env, predict, _FIRST + k) for k in range(episodes)]
+    good = sum(place.good(episode.seen) for episode in each)
+    return round(100 * good / episodes), sum(e.seconds for e in each) / sum(e.decisions for e in each)
 
 
 def planned(*, name: str, seed: int, steps: int = 1_000, episodes: int = 100) -> dict[str, Any]:

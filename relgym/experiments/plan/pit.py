@@ -7,6 +7,7 @@ from typing import Any, Final
 import gymnasium as gym
 import numpy as np
 
+from relgym.experiments.plan.course import played
 from relgym.planning import PlanningAgent, TreeSearch
 
 __all__ = ["Pit", "falling", "falls"]
@@ -53,17 +54,8 @@ class Pit(gym.Env[Any, Any]):
 
 def falls(agent: PlanningAgent, episodes: int, *, begin: float) -> int:
     """In how many episodes, long enough to reach it, an agent falls into the pit."""
-    env, found = Pit(begin=begin, steps=20), 0
-    for k in range(episodes):
-        seen, _ = env.reset(seed=k)
-        state, over = None, False
-        info: dict[str, Any] = {}
-        while not over:
-            action, state = agent.predict(seen, state)
-            seen, _, terminated, truncated, info = env.step(action)
-            over = terminated or truncated
-        found += bool(info["fallen"])
-    return found
+    env = Pit(begin=begin, steps=20)
+    return sum(bool(played(env, agent.predict, k).info["fallen"]) for k in range(episodes))
 
 
 def falling(*, seed: int, safe: bool, episodes: int = 100, steps: int = 150) -> dict[str, int]:

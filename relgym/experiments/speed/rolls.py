@@ -6,9 +6,10 @@ from the call to its result: scenes are sent there and fetched back (`relgym ben
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from statistics import median
 from time import perf_counter, process_time
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -45,22 +46,22 @@ def speeds(world: str, *, few: int = FEW, many: int = MANY) -> tuple[float, floa
     KERNEL.load()
     model, layout, vectors = scenes(world, few)
     model.rollout_batch(layout, vectors, STEPS)
-    core = []
-    for _ in range(5):
-        start = process_time()
-        lasted = model.rollout_batch(layout, vectors, STEPS).lasted
-        core.append(int(lasted.sum()) / (process_time() - start))
+
+    def steps_a_second(clock: Callable[[], float], device: Literal["cpu", "cuda"]) -> float:
+        found = []
+        for _ in range(5):
+            start = clock()
+            lasted = model.rollout_batch(layout, vectors, STEPS, device=device).lasted
+            found.append(int(lasted.sum()) / (clock() - start))
+        return median(found)
+
+    core = steps_a_second(process_time, "cpu")
     try:
         model.rollout_batch(layout, vectors, STEPS, device="cuda")
     except ConfigError as error:
-        return median(core), np.nan, str(error)
+        return core, np.nan, str(error)
     vectors = np.ascontiguousarray(np.tile(vectors, (-(-many // few), 1)))
-    card = []
-    for _ in range(5):
-        start = perf_counter()
-        lasted = model.rollout_batch(layout, vectors, STEPS, device="cuda").lasted
-        card.append(int(lasted.sum()) / (perf_counter() - start))
-    return median(core), median(card), ""
+    return core, steps_a_second(perf_counter, "cuda"), ""
 
 
 def trial(*, world: str) -> dict[str, Any]:
