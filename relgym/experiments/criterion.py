@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from argparse import ArgumentTypeError
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from statistics import median
 from typing import Any, Literal, TypeAlias
 
 from relgym.model.reports.text import Cell, table
 
-__all__ = ["Criterion", "Figure", "Measure", "Side", "gathered", "measured", "one_of", "report"]
+__all__ = ["Figure", "Measure", "Side", "gathered", "measured", "one_of", "report"]
 
 Side: TypeAlias = Literal["<=", ">="]
 """Whether a figure may be at most or must be at least its limit."""
@@ -21,49 +21,30 @@ Figure: TypeAlias = tuple[str, float, float, Side]
 
 
 @dataclass(frozen=True, slots=True)
-class Criterion:
-    """A limit that a figure must keep.
+class Measure:
+    """A figure, measured several times, beside its limit.
 
     Attributes
     ----------
     what
         Of what, with its unit.
-    limit
-        The limit.
-    side
-        Whether the figure may be at most or must be at least that.
-    """
-
-    what: str
-    limit: float
-    side: Side = "<="
-
-    def met(self, value: float) -> bool:
-        """Whether a figure keeps the limit; NaN never does."""
-        return value <= self.limit if self.side == "<=" else value >= self.limit
-
-
-@dataclass(frozen=True, slots=True)
-class Measure:
-    """A figure, measured several times, against its criterion.
-
-    Attributes
-    ----------
-    criterion
-        The criterion.
+    limit, side
+        The limit, and whether the figure may be at most or must be at least that.
     values
         One figure per repetition (training seed, or pair of training and test seed).
     """
 
-    criterion: Criterion
+    what: str
+    limit: float
     values: tuple[float, ...]
+    side: Side = "<="
 
     @property
     def worst(self) -> float:
         """The figure farthest on the wrong side; NaN if there is none."""
         if not self.values or any(math.isnan(v) for v in self.values):
             return math.nan
-        return max(self.values) if self.criterion.side == "<=" else min(self.values)
+        return max(self.values) if self.side == "<=" else min(self.values)
 
     @property
     def middle(self) -> float:
@@ -72,18 +53,19 @@ class Measure:
 
     @property
     def ok(self) -> bool:
-        """Whether the worst figure keeps the limit."""
-        return self.criterion.met(self.worst)
+        """Whether the worst figure keeps the limit; NaN never does."""
+        return self.worst <= self.limit if self.side == "<=" else self.worst >= self.limit
 
     def to_json(self) -> dict[str, Any]:
         """Plain data; what is no finite number is told in words, as JSON has none."""
+        about = {"what": self.what, "limit": self.limit, "side": self.side}
         derived = {"worst": _plain(self.worst), "median": _plain(self.middle), "ok": self.ok}
-        return asdict(self.criterion) | {"values": list(map(_plain, self.values))} | derived
+        return about | {"values": list(map(_plain, self.values))} | derived
 
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Measure:
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Measure:
         """Read what `to_json` wrote."""
-        return cls(Criterion(data["what"], data["limit"], data["side"]), tuple(map(float, data["values"])))
+        return measured(data["what"], data["limit"], data["values"], data["side"])
 
 
 def _plain(value: float) -> float | str:
@@ -91,24 +73,24 @@ def _plain(value: float) -> float | str:
 
 
 def measured(what: str, limit: float, values: Iterable[float], side: Side = "<=") -> Measure:
-    """A criterion and its figures in one call."""
-    return Measure(Criterion(what, limit, side), tuple(map(float, values)))
+    """Figures of any kind of number beside their limit."""
+    return Measure(what, limit, tuple(map(float, values)), side)
 
 
 def gathered(figures: Iterable[Figure]) -> list[Measure]:
     """Figures that come one by one, those of the same thing together; in the order in which each comes first."""
-    found: dict[Criterion, list[float]] = {}
+    found: dict[tuple[str, float, Side], list[float]] = {}
     for what, limit, value, side in figures:
-        found.setdefault(Criterion(what, limit, side), []).append(float(value))
-    return [Measure(criterion, tuple(values)) for criterion, values in found.items()]
+        found.setdefault((what, limit, side), []).append(value)
+    return [measured(what, limit, values, side) for (what, limit, side), values in found.items()]
 
 
 def report(title: str, measures: Sequence[Measure], notes: Iterable[str] = ()) -> str:
     """A table of figures and limits, for people."""
     rows: list[list[Cell]] = [
         [
-            m.criterion.what,
-            f"{m.criterion.side} {m.criterion.limit:g}",
+            m.what,
+            f"{m.side} {m.limit:g}",
             f"{m.worst:.4g}",
             f"{m.middle:.4g}",
             len(m.values),

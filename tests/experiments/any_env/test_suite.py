@@ -70,7 +70,7 @@ def test_a_long_life_is_measured_beyond_its_bound(
     name: str, right: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     figures = memory(name, [(TUNING_SEEDS[0], TUNING_TEST_SEED)], steps=600, bound=200)
-    found = {m.criterion.what: m for m in gathered(figures)}
+    found = {m.what: m for m in gathered(figures)}
     assert found["most rows kept, over the bound"].ok
     assert found[right].worst < 0.5
     assert "600 transitions, 200 kept" in capsys.readouterr().out
