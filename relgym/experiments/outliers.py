@@ -31,6 +31,9 @@ ENVS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
 SMALLEST, LARGEST = 3.0, 300.0
 """Decimal exponents between which outliers' magnitudes are drawn."""
 
+NAN = 0.1
+"""Share of outliers that are NaN."""
+
 
 class Corrupted(gym.ObservationWrapper[Any, Any, Any]):
     """An env that observes some numbers wrongly: replaced by ±1e3 … ±1e300, or by NaN.
@@ -41,15 +44,13 @@ class Corrupted(gym.ObservationWrapper[Any, Any, Any]):
         Its observations are arrays, or dicts of them.
     share
         Probability with which each number is replaced.
-    nan
-        Share of the replaced ones that become NaN.
     seed
         Seed of the draws.
     """
 
-    def __init__(self, env: gym.Env[Any, Any], share: float, *, nan: float = 0.1, seed: int = 0) -> None:
+    def __init__(self, env: gym.Env[Any, Any], share: float, seed: int) -> None:
         super().__init__(env)
-        self._share, self._nan = share, nan
+        self._share = share
         self._rng = np.random.default_rng(seed)
         self.replaced = 0
 
@@ -63,7 +64,7 @@ class Corrupted(gym.ObservationWrapper[Any, Any, Any]):
             self.replaced += int(hit.sum())
             exponents = self._rng.uniform(SMALLEST, LARGEST, values.shape)
             wild = np.power(10.0, exponents) * self._rng.choice([-1.0, 1.0], values.shape)
-            wild[self._rng.random(values.shape) < self._nan] = np.nan
+            wild[self._rng.random(values.shape) < NAN] = np.nan
             values = np.where(hit, wild, values)
         return values
 
@@ -74,7 +75,7 @@ def learned(name: str, steps: int, seed: int, *, share: float = 0.0) -> ModelLea
     inner: gym.Env[Any, Any] = gym.make(env_id, disable_env_checker=True, **arguments)
     config = {"frames": "world"} if name == "ball-modes" else {}
     if share:
-        inner = Corrupted(inner, share, seed=seed)
+        inner = Corrupted(inner, share, seed)
     env = ModelLearner(inner, bad_observations="skip", config=config, predict=True)
     env.action_space.seed(seed)
     env.reset(seed=seed)

@@ -108,7 +108,7 @@ def demonstrate(out: Path, *, steps: int, seed: int, learned: bool, bar: Progres
     return DynaDemo(course.title, tuple(runs), _drawn(out, runs, shown, course))
 
 
-def episodes(agent: Any, model: WorldModel, course: Course, *, count: int = _SHOWN) -> list[Trajectory]:
+def episodes(agent: Any, model: WorldModel, course: Course) -> list[Trajectory]:
     """Real episodes of an agent, and what the model makes of its actions from the first scene alone.
 
     Parameters
@@ -119,11 +119,9 @@ def episodes(agent: Any, model: WorldModel, course: Course, *, count: int = _SHO
         Predicts.
     course
         Where.
-    count
-        How many.
     """
     env, found = make_env(course), []
-    for k in range(count):
+    for k in range(_SHOWN):
         seen, _ = env.reset(seed=_FIRST_SHOWN + k)
         over, info = False, dict[str, Any]()
         while not over:

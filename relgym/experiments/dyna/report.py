@@ -53,9 +53,9 @@ def interquartile_mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def interval(
-    values: NDArray[np.float64], *, rng: np.random.Generator, share: float = 0.95
+    values: NDArray[np.float64], *, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Interquartile mean over seeds and its percentile bootstrap interval.
+    """Interquartile mean over seeds and its percentile bootstrap interval, which holds 95 %.
 
     Parameters
     ----------
@@ -63,8 +63,6 @@ def interval(
         Shape ``(points, seeds)``.
     rng
         Draws the bootstrap samples.
-    share
-        Of the bootstrap distribution that the interval holds.
 
     Returns
     -------
@@ -73,7 +71,7 @@ def interval(
     seeds = values.shape[1]
     drawn = values[:, rng.integers(seeds, size=(RESAMPLES, seeds))]
     means = interquartile_mean(drawn)
-    low, high = np.quantile(means, [(1.0 - share) / 2.0, (1.0 + share) / 2.0], axis=1)
+    low, high = np.quantile(means, [0.025, 0.975], axis=1)
     return interquartile_mean(values), low, high
 
 
@@ -122,15 +120,13 @@ def _times(runs: Sequence[Run]) -> tuple[list[float], ...]:
     )
 
 
-def draw_runs(path: Path, runs: Sequence[Run], title: str, *, seed: int = 0) -> Path:
+def draw_runs(path: Path, runs: Sequence[Run], title: str) -> Path:
     """Draw successes over real steps (`draw_successes`)."""
     shown = {ARMS[arm].title: [run.curve for run in own] for arm, own in _by_arm(runs)}
-    return draw_successes(path, shown, title, "real steps", seed=seed)
+    return draw_successes(path, shown, title, "real steps")
 
 
-def draw_successes(
-    path: Path, shown: Mapping[str, Sequence[Curve] | int], title: str, unit: str, *, seed: int = 0
-) -> Path:
+def draw_successes(path: Path, shown: Mapping[str, Sequence[Curve] | int], title: str, unit: str) -> Path:
     """Draw successes of 100 over what they cost: interquartile mean and 95 % interval of each arm.
 
     Parameters
@@ -141,8 +137,6 @@ def draw_successes(
         Curves of each arm by its title; a number of successes, which costs nothing, is a level.
     title, unit
         Of the picture, and of the costs.
-    seed
-        Of the intervals.
 
     Raises
     ------
@@ -152,7 +146,7 @@ def draw_successes(
     require_matplotlib()
     from matplotlib.figure import Figure  # no pyplot: it would choose a window system
 
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     figure = Figure(figsize=(7.5, 4.2), layout="constrained")
     axes = figure.subplots()
     for arm, own in shown.items():

@@ -22,6 +22,7 @@ __all__ = ["on_the_floor", "scaling"]
 _RADIUS: Final = 0.1
 _FEW, _MANY = 2, 8
 _SMALL, _LARGE = 12, 60
+_REPEATS: Final = 200
 
 
 def on_the_floor(touching: int, objects: int) -> tuple[World, SceneLayout, Float2D]:
@@ -44,12 +45,11 @@ def on_the_floor(touching: int, objects: int) -> tuple[World, SceneLayout, Float
     return world, layout, np.array([values], dtype=np.float64)
 
 
-def scaling(repeats: int = 200) -> list[Measure]:
+def scaling() -> list[Measure]:
     """Times of a step by laws alone, the relations being known: eight pairs against two, 60 objects against 12."""
     book = laws_of(taught(trial_rooms(World(2), 10, seed=SEEDS[0])))
     few, many, large = (
-        _seconds(book, pairs, objects, repeats)
-        for pairs, objects in ((_FEW, _SMALL), (_MANY, _SMALL), (_FEW, _LARGE))
+        _seconds(book, pairs, objects) for pairs, objects in ((_FEW, _SMALL), (_MANY, _SMALL), (_FEW, _LARGE))
     )
     return [
         measured(
@@ -59,12 +59,12 @@ def scaling(repeats: int = 200) -> list[Measure]:
     ]
 
 
-def _seconds(book: LawBook, touching: int, objects: int, repeats: int) -> float:
+def _seconds(book: LawBook, touching: int, objects: int) -> float:
     """Median processor time of a step by laws."""
     world, layout, vectors = on_the_floor(touching, objects)
     relations = Extractor(world.schema()).extract(layout, vectors)
     spent = []
-    for _ in range(repeats):
+    for _ in range(_REPEATS):
         start = process_time()
         book.motion(Contacts.of(book.cast(layout), relations, vectors), vectors)
         spent.append(process_time() - start)

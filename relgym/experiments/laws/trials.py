@@ -28,7 +28,6 @@ __all__ = [
     "noise",
     "noisy",
     "other_worlds",
-    "transplanted",
     "trial_rooms",
 ]
 
@@ -36,6 +35,8 @@ _ROUGH: Final = Material(0.9, 0.2)
 _SLIDES: Final = "max(0, u_t - 0.2 J_n)"
 _BOUNCES: Final = "max(u_n, -0.9 v_n)"
 _STEPS: Final = 200
+_TRAIN, _TEST = 40, 20
+"""Rooms that are learned from, and tested on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,33 +139,33 @@ def _formulas(book: LawBook) -> tuple[str, frozenset[str]]:
 
 
 # ------------------------------------------------------------------ other worlds
-def other_worlds(seeds: Sequence[int], train: int = 40, test: int = 20) -> Shown:
+def other_worlds(seeds: Sequence[int]) -> Shown:
     """The laws of each trial world, found and right."""
     measures: list[Measure] = []
     notes: list[str] = []
     for trial in TRIALS:
         missed, shares = [], []
         for seed in seeds:
-            model = taught(trial_rooms(trial.world, train, seed=seed))
+            model = taught(trial_rooms(trial.world, _TRAIN, seed=seed))
             frame, found = _formulas(laws_of(model))
             missed.append(len(found ^ trial.laws) + (frame != trial.frame))
-            shares.append(100.0 * score(model, trial_rooms(trial.world, test, seed=TESTS[0])).share)
+            shares.append(100.0 * score(model, trial_rooms(trial.world, _TEST, seed=TESTS[0])).share)
         measures.append(measured(f"{trial.name}: laws missed or invented", 0, missed))
         measures.append(measured(f"{trial.name}: wrong or abstained, %", 0.1, shares))
         notes += [f"{trial.name}: {row}" for row in report_of(model).laws]
-    shares = [100.0 * transplanted(seed, train, test) for seed in seeds]
+    shares = [100.0 * _transplanted(seed) for seed in seeds]
     measures.append(measured("space by laws of contact from the plane: wrong or abstained, %", 0.1, shares))
     return Shown(measures, notes)
 
 
-def transplanted(seed: int, train: int = 40, test: int = 20) -> float:
+def _transplanted(seed: int) -> float:
     """Share of wrong predictions in space, by free flight in space and contacts in the plane alone."""
     plane = World(2, materials={"block": _ROUGH})
     space = TRIALS[0].world
-    below, above = (laws_of(taught(trial_rooms(w, train, seed=seed))) for w in (plane, space))
+    below, above = (laws_of(taught(trial_rooms(w, _TRAIN, seed=seed))) for w in (plane, space))
     above.pair = below.pair
     above.forget()
-    return score_laws(above, trial_rooms(space, test, seed=TESTS[0])).share
+    return score_laws(above, trial_rooms(space, _TEST, seed=TESTS[0])).share
 
 
 # ------------------------------------------------------------------ noise
@@ -213,14 +214,14 @@ def constants(book: LawBook) -> dict[str, float]:
 
 
 # ------------------------------------------------------------------ what no law can state
-def inexpressible(seeds: Sequence[int], train: int = 40, test: int = 20) -> Shown:
+def inexpressible(seeds: Sequence[int]) -> Shown:
     """Laws of contacts that aren't of their form must abstain."""
     measures: list[Measure] = []
     for name, world in INEXPRESSIBLE.items():
         laws, models = [], []
         for seed in seeds:
-            model = taught(trial_rooms(world, train, seed=seed))
-            fresh = trial_rooms(world, test, seed=TESTS[0])
+            model = taught(trial_rooms(world, _TRAIN, seed=seed))
+            fresh = trial_rooms(world, _TEST, seed=TESTS[0])
             laws.append(score_laws(laws_of(model), fresh))
             models.append(score(model, fresh))
         total = laws[0].transitions

@@ -25,6 +25,9 @@ __all__ = ["FOREIGN", "Foreign", "SwingUp", "Uphill", "agent_alone", "planned"]
 _FIRST: Final = 50_000
 """Seed of the first test episode, far from those of training."""
 
+_ENOUGH: Final = 95
+"""Successes of 100 that end the run of an agent alone."""
+
 _UPRIGHT: Final = 0.95
 """Cosine of the angle above which a pendulum stands upright."""
 
@@ -169,7 +172,7 @@ def planned(*, name: str, seed: int, steps: int = 1_000, episodes: int = 100) ->
     return {"successes": good, "learning": learning, "decision": decision, "laws": env.model.describe()}
 
 
-def agent_alone(*, name: str, seed: int, episodes: int = 100, enough: int = 95) -> dict[str, Any]:
+def agent_alone(*, name: str, seed: int, episodes: int = 100) -> dict[str, Any]:
     """Train Stable-Baselines3's agent until it solves as many test episodes as were asked for.
 
     Parameters
@@ -180,8 +183,6 @@ def agent_alone(*, name: str, seed: int, episodes: int = 100, enough: int = 95) 
         Of everything random.
     episodes
         Of a test.
-    enough
-        Successes of 100 that end the run.
 
     Returns
     -------
@@ -211,11 +212,11 @@ def agent_alone(*, name: str, seed: int, episodes: int = 100, enough: int = 95) 
                 return True
             curve.append((self.num_timesteps, _solved(place, self.model, episodes)[0]))
             print(f"{name}, {place.baseline}, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
-            return curve[-1][1] < enough
+            return curve[-1][1] < _ENOUGH
 
     made = getattr(stable_baselines3, place.baseline)
     made("MlpPolicy", place.env_id, seed=seed, device="cpu", **place.settings).learn(
         place.limit, callback=Check()
     )
-    good = bool(curve) and curve[-1][1] >= enough
+    good = bool(curve) and curve[-1][1] >= _ENOUGH
     return {"curve": curve, "solved_at": curve[-1][0] if good else None}

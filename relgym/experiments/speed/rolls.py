@@ -41,10 +41,10 @@ def scenes(world: str, count: int) -> tuple[WorldModel, SceneLayout, Float2D]:
     return model, deeds.layout, np.ascontiguousarray(np.concatenate(found)[drawn])
 
 
-def speeds(world: str, *, few: int = FEW, many: int = MANY) -> tuple[float, float, str]:
+def speeds(world: str) -> tuple[float, float, str]:
     """Steps a second on one core and on a card (NaN where there is none), and why there is none."""
     KERNEL.load()
-    model, layout, vectors = scenes(world, few)
+    model, layout, vectors = scenes(world, FEW)
     model.rollout_batch(layout, vectors, STEPS)
 
     def steps_a_second(clock: Callable[[], float], device: Literal["cpu", "cuda"]) -> float:
@@ -60,7 +60,7 @@ def speeds(world: str, *, few: int = FEW, many: int = MANY) -> tuple[float, floa
         model.rollout_batch(layout, vectors, STEPS, device="cuda")
     except ConfigError as error:
         return core, np.nan, str(error)
-    vectors = np.ascontiguousarray(np.tile(vectors, (-(-many // few), 1)))
+    vectors = np.ascontiguousarray(np.tile(vectors, (MANY // FEW, 1)))
     return core, steps_a_second(perf_counter, "cuda"), ""
 
 
