@@ -5,7 +5,6 @@ from __future__ import annotations
 from time import process_time
 from typing import Any, Final
 
-import gymnasium as gym
 import numpy as np
 
 from relgym.experiments.dyna import arms as dyna_arms
@@ -94,7 +93,7 @@ def delivered(*, arm: str, seed: int, episodes: int, first: int = 0) -> dict[str
 
 def _simulator(arm: str, seed: int) -> Simulator:
     """What was learned from random actions, transition by transition, with the env's own reward."""
-    env = TransitionRecorder(gym.make(DELIVERY.env_id, disable_env_checker=True))
+    env = TransitionRecorder(DELIVERY.make())
     task: Any = env.get_wrapper_attr("task")
     relational = arm == "relgym"
     model: Any = (

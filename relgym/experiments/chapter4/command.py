@@ -64,14 +64,8 @@ class Request:
 def reproduce(request: Request) -> Iterator[Progress | Made]:
     """Compute what is missing, then make every table and figure; progress and outputs as they come."""
     jobs, protocol, store = request.jobs, request.protocol, ResultStore(request.out / "cache")
-    yield from compute(
-        jobs,
-        protocol,
-        store,
-        workers=request.workers,
-        backend=request.backend,
-        address=request.address,
-    )
+    where = {"workers": request.workers, "backend": request.backend, "address": request.address}
+    yield from compute(jobs, protocol, store, **where)
     for job in jobs:
         yield make(job, protocol, store, request.out, request.command(job.name))
 

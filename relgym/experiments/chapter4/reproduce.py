@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from relgym.errors import StoreError
 from relgym.experiments.benchmark import Made, kept, section, sections_of
@@ -35,18 +35,10 @@ PAGES: Final = {
 """Pages of results beside this one, and their titles."""
 
 
-def compute(
-    jobs: Iterable[Job],
-    protocol: Protocol,
-    store: ResultStore,
-    *,
-    workers: int | None = None,
-    backend: str = "local",
-    address: str | None = None,
-) -> Iterator[Progress]:
-    """Compute whatever the jobs need and the store lacks (`relgym.experiments.jobs.run.run`)."""
+def compute(jobs: Iterable[Job], protocol: Protocol, store: ResultStore, **where: Any) -> Iterator[Progress]:
+    """Compute whatever the jobs need and the store lacks; `where` as of `relgym.experiments.jobs.run.run`."""
     tasks = [task for job in jobs for group in job.plan(protocol).values() for task in group]
-    yield from run(tasks, store, workers=workers, backend=backend, address=address)
+    return run(tasks, store, **where)
 
 
 def make(job: Job, protocol: Protocol, store: ResultStore, out: Path, command: str) -> Made:

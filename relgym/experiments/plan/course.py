@@ -100,6 +100,10 @@ class Course:
     search: TreeSearch = field(default_factory=TreeSearch)
     expert: Callable[[Scene], Any] | None = None
 
+    def make(self) -> gym.Env[Any, Any]:
+        """Its env, a step at a time."""
+        return gym.make(self.env_id, disable_env_checker=True, **self.arguments)
+
 
 _BALL: Final = Course(
     "ball",
@@ -218,8 +222,8 @@ class Tests:
     def __init__(
         self, course: Course, episodes: int = EPISODES, *, first: int = 0, failures: int | None = None
     ) -> None:
-        env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
-        self._env: gym.Env[Any, Any] = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
+        env = course.make()
+        self._env = ActionRepeat(env, course.repeat) if course.repeat > 1 else env
         self._first, self._episodes = first, episodes
         self._failures = episodes if failures is None else failures
         self.decisions, self.seconds = 0, 0.0
@@ -289,7 +293,7 @@ class NeuralSimulator:
 
 def make_agent(course: Course, arm: Arm, *, seed: int, env: gym.Env[Any, Any] | None = None) -> PlanningAgent:
     """An agent that has seen nothing yet, in the course's env or another one with the same spaces."""
-    env = gym.make(course.env_id, disable_env_checker=True, **course.arguments) if env is None else env
+    env = course.make() if env is None else env
     options: dict[str, Any] = {"search": course.search, "repeat": course.repeat, "seed": seed, **course.agent}
     if not arm.explores:
         options["exploration"] = 0.0
@@ -413,7 +417,7 @@ def knowing(*, course: str, explores: bool, seed: int, steps: int, every: int = 
 
 def _fresh_steps(course: Course) -> list[list[Experience]]:
     """Steps that an agent is tested on: all in one group, or one for each body that is touched."""
-    made = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
+    made = course.make()
     env = TransitionRecorder(made if course.expert is not None else _Throws(made, np.random.default_rng(0)))
     env.action_space.seed(0)
     found: dict[str, list[Experience]] = {}
@@ -489,15 +493,14 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
     same of SAC, which is tested more seldom.
     """
     course = COURSES["truck"]
-    half = {**course.arguments, "gravity": GRAVITY / 2.0}
-    worlds = [gym.make(course.env_id, disable_env_checker=True, **made) for made in (course.arguments, half)]
-    world = dyna_arms.ChangingWorld(worlds[0], worlds[1], _CHANGE)
+    later = replace(course, arguments={**course.arguments, "gravity": GRAVITY / 2.0})
+    world = dyna_arms.ChangingWorld(course.make(), later.make(), _CHANGE)
     agent = make_agent(course, ARMS["relgym"], seed=seed, env=world)
     curve: list[tuple[int, int]] = []
     for at in range(0, steps + 1, course.every):
         agent.learn(_CHANGE + at)
         failures = episodes * (EPISODES - ENOUGH) // EPISODES
-        tests = Tests(replace(course, arguments=half) if at else course, episodes, failures=failures)
+        tests = Tests(later if at else course, episodes, failures=failures)
         good, played = tests.successes(agent)
         curve.append((at, round(good * EPISODES / played)))
         print(f"changed world, seed {seed}: {curve[-1]}", file=sys.stderr, flush=True)
@@ -515,10 +518,9 @@ def recovering(*, seed: int, steps: int, episodes: int) -> dict[str, Any]:
 def ceiling(*, course: str, episodes: int = EPISODES) -> dict[str, Any]:
     """The same search in the exact engine: nothing is learned."""
     place = COURSES[course]
-    env = gym.make(place.env_id, disable_env_checker=True, **place.arguments)
     objective = Objective(discount=PlanningAgent.DISCOUNT)
     tests = Tests(place, episodes)
-    simulator = EnvSimulator(env, repeat=place.repeat)
+    simulator = EnvSimulator(place.make(), repeat=place.repeat)
     good, played = tests.successes(Planner(simulator, place.search, objective, limit=place.limit))
     return {
         "successes": round(good * 100 / played),

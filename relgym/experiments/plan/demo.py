@@ -90,7 +90,7 @@ def demonstrate(out: Path, *, steps: int = 600, episodes: int = 10, seed: int = 
     started = process_time()
     agent.learn(steps)
     learning = process_time() - started
-    env = gym.make(course.env_id, disable_env_checker=True, **course.arguments)
+    env = course.make()
     good = decisions = surprises = 0
     shown: list[Trajectory] = []
     started = process_time()
