@@ -17,42 +17,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-__all__ = ["LAWS", "MADE", "TEXTBOOK", "Law", "Maze", "Numbers", "Oscillators", "Shop"]
+__all__ = ["LAWS", "MADE", "TEXTBOOK", "Law", "Maze", "Numbers", "Shop"]
 
 MADE: Final = ("relgym-strangers/Oscillators-v0", "relgym-strangers/Shop-v0", "relgym-strangers/Maze-v0")
 """Ids that `gymnasium.make` knows once this module is imported."""
 
 EPISODE: Final = 200
 """Steps of an episode."""
-
-
-class Oscillators(gym.Env[NDArray[np.float64], NDArray[np.float64]]):
-    """Masses in a row, each tied to the next by a spring; the first is pushed, and all are shaken."""
-
-    def __init__(self, count: int = 4, noise: float = 0.02) -> None:
-        self.observation_space = spaces.Box(-np.inf, np.inf, (2 * count,), np.float64)
-        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float64)
-        self._count, self._noise = count, noise
-        self._x = self._v = np.zeros(count)
-
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float64], dict[str, Any]]:
-        """Begin somewhere near rest."""
-        super().reset(seed=seed)
-        self._x, self._v = self.np_random.normal(0.0, 0.5, (2, self._count))
-        return np.concatenate([self._x, self._v]), {}
-
-    def step(
-        self, action: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], float, bool, bool, dict[str, Any]]:
-        """Springs pull, the first mass is pushed, and all are shaken."""
-        pulled = np.diff(self._x, prepend=0.0, append=0.0)
-        force = pulled[1:] - pulled[:-1]
-        force[0] += 2.0 * float(action[0])
-        self._v = 0.98 * self._v + 0.1 * force + self.np_random.normal(0.0, self._noise, self._count)
-        self._x = self._x + 0.1 * self._v
-        return np.concatenate([self._x, self._v]), 0.0, False, False, {}
 
 
 class Shop(gym.Env[dict[str, NDArray[Any]], NDArray[np.int64]]):
@@ -184,6 +155,16 @@ class Numbers(gym.Env[NDArray[Any], Any]):
         return self._seen(), 0.0, False, False, {}
 
 
+def _oscillators(now: Row, u: Row, rng: np.random.Generator) -> Row:
+    """Masses in a row, each tied to the next by a spring; the first is pushed, and all are shaken."""
+    x, v = np.split(np.array(now), 2)
+    pulled = np.diff(x, prepend=0.0, append=0.0)
+    force = pulled[1:] - pulled[:-1]
+    force[0] += 2.0 * u[0]
+    v = 0.98 * v + 0.1 * force + rng.normal(0.0, 0.02, len(v))
+    return [*(x + 0.1 * v), *v]
+
+
 def _prey(now: Row, u: Row, _: np.random.Generator) -> Row:
     x, y = now
     return x + 0.05 * x * (1.0 - y) + 0.01 * u[0], max(y + 0.05 * y * (x - 1.0), 0.0)
@@ -287,6 +268,11 @@ def _uniform(low: Row, high: Row, rng: np.random.Generator) -> Row:
     return drawn
 
 
+def _near_rest(rng: np.random.Generator) -> Row:
+    drawn: list[float] = rng.normal(0.0, 0.5, 8).tolist()
+    return drawn
+
+
 def _heading(rng: np.random.Generator) -> Row:
     angle = rng.uniform(-3.0, 3.0)
     return 0.0, 0.0, math.cos(angle), math.sin(angle), 0.0
@@ -303,6 +289,7 @@ def _whole(high: Sequence[int], rng: np.random.Generator) -> Row:
 
 
 LAWS: Final[Mapping[str, Law]] = {
+    "Oscillators": Law(_near_rest, _oscillators),
     "Prey": Law(partial(_uniform, (0.5, 0.5), (1.5, 1.5)), _prey),
     "Thermostat": Law(partial(_uniform, (15.0, 0.0), (25.0, 0.0)), _thermostat),
     "Lorenz": Law(partial(_uniform, (-9.0, -9.0, 16.0), (9.0, 9.0, 34.0)), _lorenz),
@@ -319,10 +306,11 @@ LAWS: Final[Mapping[str, Law]] = {
 }
 """Laws by name."""
 
-TEXTBOOK: Final = tuple(f"relgym-strangers/{name}-v0" for name in LAWS)
-"""Ids of `Numbers` that follow each of them."""
+TEXTBOOK: Final = tuple(f"relgym-strangers/{name}-v0" for name in LAWS if name != "Oscillators")
+"""Ids of `Numbers` that follow each of them, but for the oscillators, which are among those made first."""
 
-for _id, _name in zip(MADE, ("Oscillators", "Shop", "Maze"), strict=True):
-    gym.register(_id, f"{__name__}:{_name}", max_episode_steps=EPISODE)
-for _id, _name in zip(TEXTBOOK, LAWS, strict=True):
+for _name in ("Shop", "Maze"):
+    gym.register(f"relgym-strangers/{_name}-v0", f"{__name__}:{_name}", max_episode_steps=EPISODE)
+for _name in LAWS:
+    _id = f"relgym-strangers/{_name}-v0"
     gym.register(_id, f"{__name__}:Numbers", kwargs={"law": _name}, max_episode_steps=EPISODE)
