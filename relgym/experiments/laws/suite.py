@@ -108,7 +108,7 @@ def _parts_of_the_world(seeds: Sequence[int]) -> Shown:
         for kind in ("floor", "wall"):
             found = [
                 score(
-                    taught(ball_episodes(experiment, seed=seed), _Touching(kind)),
+                    taught(ball_episodes(experiment, seed=seed), partial(_touching, kind)),
                     ball_episodes(experiment, seed=TESTS[0], test=True),
                 )
                 for seed in seeds
@@ -121,19 +121,12 @@ def _parts_of_the_world(seeds: Sequence[int]) -> Shown:
     return Shown(measures)
 
 
-class _Touching:
-    """Marks transitions in which the ball touches nothing but objects of one type."""
-
-    def __init__(self, kind: str) -> None:
-        self.kind = kind
-        self._extractor: Extractor | None = None
-
-    def __call__(self, episode: Part) -> NDArray[np.bool_]:
-        self._extractor = self._extractor or Extractor(episode.schema)
-        found = self._extractor.extract(episode.layout, episode.vectors[:-1])
-        ball = episode.layout.bodies.index(episode.layout.index("ball"))
-        others = [k for k, i in enumerate(episode.layout.bodies) if episode.layout.types[i].name != self.kind]
-        return np.logical_not(found.relation("intersect")[:, ball][:, others].any(axis=1))
+def _touching(kind: str, episode: Part) -> NDArray[np.bool_]:
+    """Transitions in which the ball touches nothing but objects of one type."""
+    found = Extractor(episode.schema).extract(episode.layout, episode.vectors[:-1])
+    ball = episode.layout.bodies.index(episode.layout.index("ball"))
+    others = [k for k, i in enumerate(episode.layout.bodies) if episode.layout.types[i].name != kind]
+    return np.logical_not(found.relation("intersect")[:, ball][:, others].any(axis=1))
 
 
 def _online(seeds: Sequence[int]) -> Shown:
