@@ -28,7 +28,7 @@ from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.classification.rows import Gathered, RowPool
 from relgym.config import ClassificationConfig
-from relgym.config.constants import LEAST_EXEMPLARS
+from relgym.config.constants import LEAST_EXEMPLARS, MEBIBYTE
 from relgym.mixing import GOLDEN, mixed_one
 
 __all__ = ["COLUMNS", "Exemplars", "dyadic"]
@@ -323,7 +323,7 @@ class Exemplars:
         shape = (bodies, *self.columns.sizes.values())
         if self._room_for[0] != shape:
             size = self.columns.row_bytes({"K": bodies, "K2": bodies})
-            most = max(LEAST_EXEMPLARS, self.config.exemplar_memory * 2**20 // size)
+            most = max(LEAST_EXEMPLARS, self.config.exemplar_memory * MEBIBYTE // size)
             self._room_for = shape, min(self.config.max_exemplars, most)
         return self._room_for[1]
 
@@ -382,7 +382,8 @@ class Exemplars:
 
 def dyadic(weights: Floats) -> Floats:
     """Weights rounded to 64ths, at least one of them: rounding residues would pass for examples."""
-    return np.maximum(np.round(weights * 64.0), 1.0) / 64.0
+    parts = 64.0
+    return np.maximum(np.round(weights * parts), 1.0) / parts
 
 
 def _hash(key: bytes, count: float) -> int:

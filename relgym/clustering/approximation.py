@@ -13,6 +13,7 @@ columns are searched alone, too. What was found first gives way to a shorter fun
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Final
@@ -22,36 +23,39 @@ from numpy.typing import NDArray
 
 from relgym.clustering.discovery import likeness
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALTERNATIVES, CALL, NEARLY_ALL, ROUNDS, TYPICAL
+from relgym.config.constants import (
+    ALTERNATIVES,
+    CALL,
+    MAJORITY,
+    NEARLY_ALL,
+    RECENT,
+    ROUNDS,
+    SEARCHED_ROWS,
+    SELDOM,
+    SMALL,
+    STDS,
+    TYPICAL,
+)
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, forward_stepwise
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
-    "EQUAL",
     "LEFT",
     "Approximation",
     "approximate",
+    "as_good",
     "normal_reach",
     "reach",
     "terms_of",
 ]
 
-LEFT = 0.1
+LEFT: Final = SMALL
 """Largest share of the change's standard deviation that an approximation may leave: with features that were asked
 for, and without any, where a coarse linear function would pass for a law."""
-
-NOISY, ALIKE = 0.5, 0.2
-"""Largest share that may be left if it is noise: if residuals of neighbours are correlated by no more than this."""
-
-MANY_FEATURES = (200, 800)
-"""Among so many columns an approximation may have twice, or three times, as many terms as a mode."""
 
 SERVED: Final = 0.7
 """Of the rows that a term serves, by more than noise, so large a share must be explained where they are few, fewer than
 may be left unexplained: else it isn't their law."""
-
-EQUAL: Final = 1.1
-"""A shorter function may err more by this factor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +69,12 @@ class Approximation:
 
 
 def terms_of(columns: int, config: ClusteringConfig) -> int:
-    """Largest number of weights of an approximation among so many columns."""
-    return config.max_terms * (1 + sum(columns > many for many in MANY_FEATURES))
+    """Largest number of weights of an approximation among so many columns.
+
+    As many as a mode may have; twice as many where columns outnumber the `RECENT` examples that the first approximation
+    has at least, and three times where they outnumber those of the next one, too.
+    """
+    return config.max_terms * (1 + sum(columns > rows for rows in (RECENT, SELDOM * RECENT)))
 
 
 def normal_reach() -> float:
@@ -77,6 +85,11 @@ def normal_reach() -> float:
 def reach(errors: NDArray[np.float64], floor: float = 0.0) -> float:
     """The error, in units of y, that nearly all rows stay below; errors as small as rounding are all alike."""
     return max(float(np.quantile(errors, NEARLY_ALL)), normal_reach() * floor)
+
+
+def as_good(one: float, other: float) -> bool:
+    """Whether the first of two errors is no larger than the other one, but for a small part."""
+    return one <= (1.0 + SMALL) * other
 
 
 @resumable
@@ -109,7 +122,7 @@ def approximate(
     left
         Largest share of the change's standard deviation that may be left.
     noisy
-        Whether up to `NOISY` of it may be left if that is noise, and then the number of leading columns that are no
+        Whether up to `MAJORITY` of it may be left if that is noise, and then the number of leading columns that are no
         features: they say how close rows lie. Noise need not be normal: it may come with some actions only.
     lines
         Whether columns that are no features are searched alone, too.
@@ -133,7 +146,7 @@ def approximate(
 
 def _shorter(one: Approximation, other: Approximation) -> bool:
     """Whether a function is shorter than another one, and as good."""
-    return one.fit.terms < other.fit.terms and one.reach <= EQUAL * other.reach
+    return one.fit.terms < other.fit.terms and as_good(one.reach, other.reach)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +192,7 @@ class _Search:
         kept = explained & counted
         sigma = self._sigma(fit, kept)
         share = sigma / max(float(self.change[kept].std()), self.floor)
-        if share > self.left and not (self.noisy and share <= NOISY and self._is_noise(fit, kept)):
+        if share > self.left and not (self.noisy and share <= MAJORITY and self._is_noise(fit, kept)):
             return None
         shorter = yield from eliminate_backward.steps(self.x[kept], self.y[kept], fit, sigma=sigma)
         return Approximation(shorter, explained, sigma, reach(self._errors(shorter), self.floor))
@@ -219,6 +232,7 @@ class _Search:
     def _is_noise(self, fit: LinearFit, kept: NDArray[np.bool_]) -> bool:
         """Whether residuals are not alike between neighbours, and take as many values as noise does."""
         rest = (self.y - fit.predict(self.x))[kept]
-        if len(np.unique(self.y[kept])) < 0.5 * len(rest):
+        if len(np.unique(self.y[kept])) < MAJORITY * len(rest):
             return False  # a choice among few values is no noise
-        return likeness(self.x[kept][:, : self.noisy], rest) <= ALIKE
+        # A correlation by chance, of as many pairs of neighbours as are looked at.
+        return likeness(self.x[kept][:, : self.noisy], rest) <= STDS / math.sqrt(SEARCHED_ROWS)

@@ -29,9 +29,6 @@ __all__ = ["ClusterReport", "ModeClusterer"]
 ESTIMATE = 1_500_000
 """What an estimate of the noise costs, in cells."""
 
-LESS = 0.5
-"""Where most is unexplained, noise was overrated by the first few examples if more of them show so much less."""
-
 
 class ModeClusterer:
     """Segments a target's examples into modes, one example at a time.
@@ -70,9 +67,7 @@ class ModeClusterer:
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
         self._sought = 0  # after so many examples the latest one began
-        self._anew = (
-            False  # other next values are given since the latest approximation: laws are searched for first
-        )
+        self._anew = False  # other next values are given since the latest one: laws are searched for first
         self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
         self._reach = 0.0  # value of the target
@@ -287,8 +282,11 @@ class ModeClusterer:
         self._assume(max(floor, self._spread))
 
     def _refutes(self, estimate: float) -> bool:
-        """Whether an estimate of the noise refutes the one that is assumed: it is larger, or most was overrated."""
-        if estimate < LESS * self.scale.sigma and not self.approximate:
+        """Whether an estimate of the noise refutes the one that is assumed: it is larger, or most was overrated.
+
+        Where most is unexplained, the first few examples overrated it if more of them show less than half of it.
+        """
+        if 2.0 * estimate < self.scale.sigma and not self.approximate:
             return True
         explained = 1.0 - self.noise_examples / self.seen
         return refuted(self.scale.sigma, estimate, explained=explained, y=self.y)

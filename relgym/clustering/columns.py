@@ -12,7 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import IntEnum, auto
 from functools import cached_property
+from itertools import accumulate, chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +22,32 @@ from numpy.typing import NDArray
 from relgym.clustering.features import NO_FEATURES, Feature, Library
 from relgym.scene.objects import ACTION, STILL, TASK, ObjectType, SceneLayout, Target
 
-__all__ = ["Column", "SlotSignature", "slot_order"]
+__all__ = ["Column", "Rank", "SlotSignature", "slot_order"]
 
 PRIME = "'"
 
-_STAGE = (0, 0, 3, 2, 3, 1)
-"""When columns of each rank are tried: poses last, since few laws depend on where things are (R2). With them what never
-changes in an episode: what a step is worth is mostly what it changes, and among sixty columns, most of them constants
-of a scene, no sample of a few steps finds a reward's modes."""
 
-_FEATURE = 5
-"""Rank of non-linear features."""
+class Rank(IntEnum):
+    """What a column is, in order of preference."""
+
+    OWN = auto()
+    """A property of the target other than its pose."""
+    BODILESS = auto()
+    """A property of an object without a body, alone of its type."""
+    POSE = auto()
+    """Of the target; and what never changes in an episode, where the target is what a step is worth."""
+    OTHER = auto()
+    """A property of another object other than its pose."""
+    OTHER_POSE = auto()
+    """Of another object."""
+    FEATURE = auto()
+    """Non-linear."""
+
+
+_STAGES = ((Rank.OWN, Rank.BODILESS), (Rank.FEATURE,), (Rank.OTHER,), (Rank.POSE, Rank.OTHER_POSE))
+"""What is tried together, one after the other: poses last, since few laws depend on where things are (R2). With them
+what never changes in an episode: what a step is worth is mostly what it changes, and among sixty columns, most of them
+constants of a scene, no sample of a few steps finds a reward's modes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +56,7 @@ class Column:
 
     slot: int
     property: str
-    rank: int
+    rank: Rank
 
 
 @dataclass(frozen=True)
@@ -134,12 +151,13 @@ class SlotSignature:
         column = self.at(index)
         return column.property if column.slot == 0 else f"{self.types[column.slot].name}.{column.property}"
 
-    def _rank(self, slot: int, posed: bool) -> int:
+    def _rank(self, slot: int, posed: bool) -> Rank:
         if slot == 0:
-            return 2 if posed else 0
+            return Rank.POSE if posed else Rank.OWN
         if self.singleton(slot) and not self.types[slot].has_body:
-            return 2 if self.types[slot].name == STILL and self.types[0].name == TASK else 1
-        return 4 if posed else 3
+            still = self.types[slot].name == STILL and self.types[0].name == TASK
+            return Rank.POSE if still else Rank.BODILESS
+        return Rank.OTHER_POSE if posed else Rank.OTHER
 
     @cached_property
     def _index(self) -> dict[tuple[int, str], int]:
@@ -150,7 +168,7 @@ class SlotSignature:
     @cached_property
     def core(self) -> int:
         """Number of leading columns that mean the same in every signature of the same target."""
-        return sum(c.rank <= 2 for c in self.columns)
+        return sum(c.rank <= Rank.POSE for c in self.columns)
 
     @cached_property
     def slots_by_type(self) -> dict[str, tuple[int, ...]]:
@@ -182,7 +200,7 @@ class SlotSignature:
         """The column of an index, a feature being one of slot 0."""
         if index < len(self.columns):
             return self.columns[index]
-        return Column(0, self.features[index - len(self.columns)].name, _FEATURE)
+        return Column(0, self.features[index - len(self.columns)].name, Rank.FEATURE)
 
     def values(self, x: NDArray[np.float64], index: int) -> NDArray[np.float64]:
         """One column, features included, on rows ``(n, d)``; shape ``(n,)``."""
@@ -223,9 +241,9 @@ class SlotSignature:
         first = self._index[0, target.property]
         every = range(len(self.columns) + len(self.features))
         rest = [k for k in every if k != first and self._allowed(k, target)]
-        rest.sort(key=lambda k: (_STAGE[self.at(k).rank], k))
-        stage = [_STAGE[self.at(k).rank] for k in rest]
-        ends = tuple(dict.fromkeys(1 + sum(s <= last for s in stage) for last in range(4)))
+        stages = [[k for k in rest if self.at(k).rank in ranks] for ranks in _STAGES]
+        rest = list(chain.from_iterable(stages))
+        ends = tuple(dict.fromkeys(1 + end for end in accumulate(map(len, stages))))
         if target.type == TASK:  # what a step is worth doesn't depend on what the last one was
             return np.array(rest, dtype=np.intp), tuple(max(0, end - 1) for end in ends)
         return np.array([first, *rest], dtype=np.intp), ends

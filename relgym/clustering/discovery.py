@@ -29,15 +29,20 @@ from relgym.config.constants import (
     ACTING,
     ALIKE,
     CALL,
+    EXACT,
     FEW_VALUES,
     FEWEST,
+    FOUNDING,
+    MAJORITY,
     MOST_ROWS,
     ROUGH,
     ROUNDED,
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
+    SCENE_ROWS,
     SEARCHED_ROWS,
     TOLD,
+    VERIFYING,
     WIDE,
 )
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
@@ -51,7 +56,6 @@ from relgym.numeric.stepwise import (
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
-    "EXACT",
     "Scale",
     "find_mode",
     "identified",
@@ -62,18 +66,8 @@ __all__ = [
     "verifying_bits",
 ]
 
-NEAR, MOST_NEAR = 16.0, 0.5
-"""Rows that miss a function by up to so many tails are near misses; so many per inlier are too many."""
-
-MOST_LIKE = 0.5
-"""Residuals of neighbours may be alike by so much, unless they are rounding."""
-
-EXACT = 24.0
-"""Where each example verifies a function by so many bits, few of them do."""
-
-SIMPLE, WORDY = (1, 1, 4), 40
-"""Of what counts, functions of the present value alone are tried first (columns, terms, sample size); others need so
-many examples: that a few small numbers add up to another one says little."""
+NEAR = 16.0
+"""Rows that miss a function by up to so many tails are near misses."""
 
 CHANGES = 0.2
 """A column that changes between so large a share of successive rows is no constant of a scene."""
@@ -105,6 +99,11 @@ class Scale:
         return self.inlier_stds * self.sigma
 
     @property
+    def surprising(self) -> float:
+        """Residual up to which one mode explains an example as well as another: two standard deviations."""
+        return 2.0 * self.sigma
+
+    @property
     def tail(self) -> float:
         """Residual up to which an unexplained example may be a known mode's tail."""
         return self.tail_stds * self.sigma
@@ -120,8 +119,8 @@ def least_examples(
     if config.min_examples != "auto":
         return int(config.min_examples)
     bits = verifying_bits(y, scale) - math.log2(choices)
-    share = min(max(2.0 - 2.0 * bits / EXACT, 0.0), 1.0)
-    return round(10 + 30 * share)
+    share, (exact, noisy) = min(max(2.0 - 2.0 * bits / EXACT, 0.0), 1.0), FOUNDING
+    return round(exact + (noisy - exact) * share)
 
 
 def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
@@ -133,7 +132,7 @@ def verifying_bits(y: NDArray[np.float64], scale: Scale) -> float:
 def counts(y: NDArray[np.float64], scale: Scale, most: int = FEW_VALUES) -> bool:
     """Whether a target's latest values are at most so many whole multiples of one step: one that fits says little."""
     values = np.unique(y[-MOST_ROWS:])
-    if not 3 <= len(values) <= most:
+    if not 2 < len(values) <= most:
         return False
     steps = np.diff(values)
     if not steps.min() > TOLD * scale.tolerance:
@@ -187,11 +186,13 @@ def find_mode(
     """
     needed = least_examples(y, scale, config) if needed is None else needed
     rows = searched(len(y), fresh, rng) if rows is None else rows
-    simple = [SIMPLE] if counting else []
+    # Of what counts, functions of the present value alone are tried first, and others need as many examples as through
+    # noise: that a few small numbers add up to another one says little.
+    simple = [(1, 1, FEWEST)] if counting else []
     completed = 0  # columns among which terms that were missing have been looked for
     for number, (columns, terms, size) in enumerate([*simple, *plans(stages, config)]):
         if simple and number:
-            needed = max(needed, WORDY)
+            needed = max(needed, max(FOUNDING))
         if len(rows) < max(needed, size):
             continue
         found = yield from consensus.steps(
@@ -331,7 +332,7 @@ def _complete(
         fit = yield from forward_stepwise.steps(x[near], y[near], sigma=scale.sigma, max_terms=terms)
         if reach <= scale.tolerance:
             return fit
-        reach = max(0.5 * reach, scale.tolerance)
+        reach = max(reach / 2.0, scale.tolerance)
 
 
 def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own: int, scale: Scale) -> bool:
@@ -352,13 +353,13 @@ def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own
     """
     error = np.abs(y - found.fit.predict(x))
     near = (error > scale.tail) & (error <= NEAR * scale.tail)
-    if int(near.sum()) > MOST_NEAR * found.size:
+    if int(near.sum()) > MAJORITY * found.size:
         return False
     rows = np.flatnonzero(found.inliers)
     left = y[rows] - found.fit.predict(x[rows])
     if float(np.sqrt(np.square(left).mean())) * ROUGH <= scale.sigma:
         return True
-    return likeness(x[rows][:, :own], left) <= MOST_LIKE
+    return likeness(x[rows][:, :own], left) <= MAJORITY
 
 
 def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
@@ -396,7 +397,7 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
             found += [(width, min(t, most), 4 * min(t, most) + 8) for t in (3, most)]
             continue
         if width <= 6:  # few enough to fit them all and drop what is needless
-            found.append((width, min(width, most), min(width, most) + 3))
+            found.append((width, min(width, most), min(width, most) + VERIFYING))
         else:
             found += [(width, min(t, most), s) for t, s in ((2, 5), (5, 12), (most, 3 * most))]
     return found
@@ -542,7 +543,7 @@ def _enough_combinations(
     """Whether slowly changing columns take enough combinations of values to support their weights."""
     if _persists(fit):
         return True
-    few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // 3]
+    few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // SCENE_ROWS]
     lively = [c for c in few if _lively(x[:, c])]
     if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:
         return False

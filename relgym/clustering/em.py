@@ -94,7 +94,7 @@ def preferred(
 
     def key(i: int) -> tuple[float, int, int, int]:
         cluster = clusters[i]
-        surprise = 0.0 if errors[i] <= 2.0 * scale.sigma else errors[i]
+        surprise = 0.0 if errors[i] <= scale.surprising else errors[i]
         return (surprise, cluster.mode.parameters, -(cluster.fitted + cluster.unfitted), i)
 
     return min(fitting, key=key)

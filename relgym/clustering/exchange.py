@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from relgym.clustering.columns import SlotSignature
 from relgym.config.constants import CALL, SAMPLES_ALIKE, SAMPLES_TRIED, SCENE_ROWS
 from relgym.numeric.ransac import choose_columns
-from relgym.numeric.stepwise import LinearFit, least_squares, varying_columns
+from relgym.numeric.stepwise import LinearFit, choosing_cells, least_squares, varying_columns
 from relgym.scheduling.work import Steps
 
 __all__ = ["Reading", "orders_of", "readings"]
@@ -177,7 +177,7 @@ class Reading:
             enough = rows.shape[1] * (loose * sigma) ** 2
             sample = np.ascontiguousarray(a[:, :, varying].swapaxes(0, 1))
             chosen, left = choose_columns(sample, y[rows], terms, sigma, enough)
-            yield CALL + 4 * a.size * max(terms, 1)
+            yield choosing_cells(a.size, terms)
             alike: dict[tuple[int, ...], int] = {}
             for k in np.flatnonzero(left <= enough).tolist():
                 picked = tuple(sorted(int(varying[c]) for c in chosen[k] if c >= 0))

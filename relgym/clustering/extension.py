@@ -19,10 +19,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import EXACT, counts, least_examples, verifying_bits
+from relgym.clustering.discovery import counts, least_examples, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
-from relgym.config.constants import ENOUGH, EVIDENCE, MOST_ROWS, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import ENOUGH, EVIDENCE, EXACT, MOST_ROWS, ROUNDED, SEARCHED_ROWS
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing
+from relgym.config.constants import FREQUENCIES, MOST_FEATURES
 from relgym.errors import ConfigError
 
 __all__ = [
-    "MOST_FEATURES",
     "NO_FEATURES",
     "Atom",
     "Feature",
@@ -36,12 +36,6 @@ __all__ = [
     "register_function",
     "switched_on",
 ]
-
-FREQUENCIES = (1, 2, 3)
-"""Sines and cosines are offered at these multiples; only the first one enters products."""
-
-MOST_FEATURES = 6_000
-"""A library of more features is refused: every search would take minutes and gigabytes."""
 
 _DEGREES = {"squares": 2, "products": 2, "degree3": 3, "degree4": 4}
 _ENTRY = re.compile(r"(?:(?P<type>[^:]+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
@@ -69,7 +63,7 @@ def register_function(name: str, function: Function) -> None:
     """
     if not name.isidentifier() or name in {"trig", "sin", "cos", *_DEGREES}:
         raise ConfigError(f"expected a new identifier as a function's name, got {name!r}; choose another one")
-    tried = np.array([0.25, 0.5])
+    tried = np.array([0.5, 1.0])
     try:
         with np.errstate(all="ignore"):
             shape = np.shape(function(tried))

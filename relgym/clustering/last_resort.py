@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.approximation import (
-    EQUAL,
     LEFT,
     Approximation,
     approximate,
+    as_good,
     reach,
     terms_of,
 )
@@ -152,9 +152,10 @@ def _accepted(
         own = np.abs(y - found.fit.predict(slots.matrix(table.x[rows], resort.order)))
         errors = [c.errors(table, rows, y, population.scale)[0] for c in modes]
         shorter = found.fit.terms < sum(c.mode.parameters for c in modes)
-        allowed = EQUAL if shorter else BETTER
-        if modes and reach(own, floor) > allowed * reach(np.min(errors, axis=0), floor):
-            return None
+        if modes:
+            new, old = reach(own, floor), reach(np.min(errors, axis=0), floor)
+            if not as_good(new, old) if shorter else new > BETTER * old:
+                return None
     elif 2 * population.noise_examples <= population.seen:
         spread = max(float((y - slots.present(table.x[rows], population.target)).std()), found.sigma)
         explained, count = 1.0 - population.noise_examples / population.seen, max(len(population.clusters), 1)

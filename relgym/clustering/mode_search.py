@@ -8,13 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import (
-    EXACT,
-    counts,
-    find_mode,
-    searched,
-    verifying_bits,
-)
+from relgym.clustering.discovery import counts, find_mode, searched, verifying_bits
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.exchange import orders_of
@@ -24,16 +18,13 @@ from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
 from relgym.clustering.suspects import Evidence, likeliest, suspects
 from relgym.clustering.unification import reordered
-from relgym.config.constants import ALTERNATIVES, CALL, RECENT, SEARCHED_CELLS, SEARCHED_ROWS
+from relgym.config.constants import ALTERNATIVES, CALL, EXACT, RECENT, SEARCHED_CELLS, SEARCHED_ROWS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.work import Task
 
 __all__ = ["ModeSearch", "Search"]
-
-SURPRISING = 2.0
-"""A new mode takes over examples that the known ones miss by so many standard deviations."""
 
 
 @dataclass(slots=True)
@@ -308,7 +299,7 @@ class ModeSearch:
         found = likeliest(evidence, strata[part], rng=self._rng, most=population.config.max_terms)
         if found is None:
             return None
-        taken = examples[part[evidence.close(found) & (known[part] > SURPRISING * population.scale.sigma)]]
+        taken = examples[part[evidence.close(found) & (known[part] > population.scale.surprising)]]
         if 2 * len(taken) < population.needed:
             return None
         return reordered(found, order), taken

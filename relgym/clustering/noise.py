@@ -26,9 +26,6 @@ SELECTED = 3.0
 MOST_WINDOWS = 24
 """At most about this many windows are looked at."""
 
-SINGLES = 2.0
-"""The same for numbers that were rounded to single precision when they were observed."""
-
 
 def rounding_noise(
     x: NDArray[np.float64], y: NDArray[np.float64], recent: NDArray[np.float64] | None = None
@@ -50,10 +47,11 @@ def rounding_noise(
         were the responses, even if something was worked out from them since (an angle from its sine and cosine).
     """
     largest = float(np.abs(y).max(initial=0.0))
+    single = 2.0 * float(np.finfo(np.float32).eps)  # of the value before and of the one after
     if bool(_single(y).all()) and bool(np.any(y != np.round(y))):
-        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, float(np.finfo(np.float32).tiny))
+        return single * max(largest, float(np.finfo(np.float32).tiny))
     if recent is not None and _rounded(recent):
-        return SINGLES * float(np.finfo(np.float32).eps) * max(largest, 1.0)
+        return single * max(largest, 1.0)
     scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)
     return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
 
@@ -145,10 +143,11 @@ def _least_spread(x: NDArray[np.float64], y: NDArray[np.float64], floor: float) 
 def _quartile(spreads: list[tuple[float, int]]) -> float:
     """Standard deviation whose estimates from as many windows would have this lower quartile."""
     values, freedom = [s for s, _ in spreads], float(np.mean([f for _, f in spreads]))
-    share = (0.25 * (len(values) - 1) + 0.5) / len(values)
+    quarter = 0.25
+    share = (quarter * (len(values) - 1) + 0.5) / len(values)
     part = 2.0 / (9.0 * freedom)  # Wilson and Hilferty's quantile of chi-square
     ratio: float = (1.0 - part + NormalDist().inv_cdf(share) * part**0.5) ** 3
-    return float(np.quantile(values, 0.25)) / math.sqrt(ratio)
+    return float(np.quantile(values, quarter)) / math.sqrt(ratio)
 
 
 def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:

@@ -6,18 +6,21 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.mode import Mode, Role
+from relgym.config.constants import RECENT, SEARCHED_CELLS
 from relgym.numeric.stepwise import LinearFit
 
 __all__ = ["Binding", "bind", "identify_roles"]
 
-MAX_ASSIGNMENTS = 5_000
-"""At most this many role assignments of one example are tried, canonical ones first."""
+MAX_ASSIGNMENTS: Final = SEARCHED_CELLS // RECENT
+"""At most this many role assignments of one example are tried, canonical ones first: those of the latest examples are
+as many numbers as one search looks at."""
 
 
 def identify_roles(fit: LinearFit, signature: SlotSignature) -> tuple[Role, ...]:

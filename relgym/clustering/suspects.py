@@ -16,15 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import Scale
-from relgym.config.constants import DRAWS, ENOUGH, EVIDENCE, MOST_ROWS, ROUNDED, TYPICAL
+from relgym.config.constants import DRAWS, ENOUGH, EVIDENCE, MOST_ROWS, ROUNDED, TYPICAL, VERIFYING
 from relgym.numeric.ransac import draw_samples
 from relgym.numeric.stepwise import LinearFit, least_squares
 
 __all__ = ["Evidence", "likeliest", "suspects"]
-
-BADLY = 2.0
-"""Examples of a state are suspects if their errors' mean square is so many times the noise's variance, or what
-is usual where noise was underrated."""
 
 TRIALS = 2_000
 """Functions tried on samples: about so many in all, from `ENOUGH` samples to `DRAWS`."""
@@ -33,7 +29,8 @@ TRIALS = 2_000
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:
     """Examples of relational states in which the known modes' errors are larger than the noise explains, oldest first.
 
-    They are at most `MOST_ROWS`, the newest.
+    Their errors' mean square is twice the noise's variance, or twice what is usual where noise was underrated. They are
+    at most `MOST_ROWS`, the newest.
 
     Parameters
     ----------
@@ -47,7 +44,7 @@ def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Sc
     square = np.square(np.minimum(errors, scale.tail) / scale.sigma)
     _, state, count = np.unique(strata, return_inverse=True, return_counts=True)
     usual = max(1.0, float(np.median(square)) / TYPICAL**2) if len(square) else 1.0
-    badly = np.bincount(state, weights=square) >= BADLY * usual * count
+    badly = np.bincount(state, weights=square) >= 2.0 * usual * count
     found: NDArray[np.intp] = np.flatnonzero(badly[state])[-MOST_ROWS:]
     return found
 
@@ -131,7 +128,7 @@ def likeliest(
     widest = min(2, most, width)
     sets = [columns for terms in range(widest + 1) for columns in combinations(range(width), terms)]
     forms = [(columns, constant) for columns in sets for constant in (True, False) if columns or constant]
-    size = widest + 3
+    size = widest + VERIFYING
     if len(y) < 2 * size:
         return None
     draws = int(np.clip(TRIALS // len(forms), ENOUGH, DRAWS))

@@ -10,7 +10,7 @@ from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.config import ClusteringConfig
-from relgym.config.constants import FIRST
+from relgym.config.constants import FIRST, MAJORITY, VERIFYING
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
 from relgym.scene.objects import Target
@@ -36,7 +36,7 @@ def covering(
     error, _ = general.errors(table, rows, y, scale)
     if (error <= scale.tolerance).mean() < config.unify_ratio:
         return False
-    return bool((np.abs(y) > scale.tolerance).mean() >= 0.5) or general.mode.parameters == 0
+    return bool((np.abs(y) > scale.tolerance).mean() >= MAJORITY) or general.mode.parameters == 0
 
 
 def unified(
@@ -76,7 +76,7 @@ def unified(
     own = slots.column(0, target.property)
     if own in order and _persist(table.x[:, own], rows, y, everyone, scale):
         return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
-    if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < 0.5:
+    if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < MAJORITY:
         return None  # on one side whatever is multiplied by nothing would do
     for width in stages[:1] if config.own_only else stages:
         x = slots.matrix(table.x[rows[pooled]], order[:width])
@@ -109,7 +109,7 @@ def _persist(
     """
     kept = [(np.abs(y[side] - present[rows[side]]) <= scale.tolerance).mean() for side in sides]
     moving = [(np.abs(y[side]) > scale.tolerance).mean() for side in sides]
-    return bool(min(kept) >= 0.5 and max(moving) >= 0.5)
+    return bool(min(kept) >= MAJORITY and max(moving) >= MAJORITY)
 
 
 def unified_family(
@@ -155,13 +155,13 @@ def unified_family(
                 sigma=scale.sigma,
                 tolerance=scale.tolerance,
                 terms=terms,
-                size=terms + 3,
+                size=terms + VERIFYING,
                 draws=2 * config.draws,
                 rng=rng,
                 anchors=np.array([len(usable) - 1]),
                 misfit=scale.misfit,
             )
-            if found is None or found.size < found.fit.terms + 3:
+            if found is None or found.size < found.fit.terms + VERIFYING:
                 continue
             which = [int(k) for k in usable[found.inliers]]
             pooled = np.concatenate([_spread(families[k]) for k in which])

@@ -22,19 +22,25 @@ __all__ = [
     "DRAWS",
     "ENOUGH",
     "EVIDENCE",
+    "EXACT",
     "EXTRAPOLATED",
     "FEWEST",
     "FEW_VALUES",
     "FIRST",
     "FIRST_ROOM",
+    "FOUNDING",
+    "FREQUENCIES",
     "LARGE",
     "LAYOUTS",
     "LEAST_EXEMPLARS",
     "LEFT_OPEN",
     "LITTLE",
     "MEMORY",
+    "MAJORITY",
+    "MEBIBYTE",
     "MORE_ROOM",
     "MOST_BYTES",
+    "MOST_FEATURES",
     "MOST_ROWS",
     "MOST_STEPS",
     "MOST_TARGETS",
@@ -57,15 +63,21 @@ __all__ = [
     "SEARCHED_ROWS",
     "SELDOM",
     "SHORT",
+    "SMALL",
     "STDS",
     "SUMMABLE",
     "TOLD",
     "TYPICAL",
+    "VERIFYING",
     "WIDE",
 ]
 
 EVIDENCE: Final = 10.0
 """Bits by which evidence must lead before anything is changed for it: such a lead misleads once in 2^10 times."""
+
+EXACT: Final = 24.0
+"""Bits by which an example of exact data verifies a function that it fits, at least: few such examples are enough. Two
+agree by chance once in 2^24 times, so that of all pairs of a few thousand hardly one does."""
 
 ROUNDED: Final = 1e-9
 """What differs by so small a share, or by so much of 1, differs by rounding: half of a float's digits, which is what is
@@ -138,6 +150,13 @@ FEWEST: Final = 4
 """Examples that found something where nothing says how sure each makes it: two that fix two weights, as most functions
 have, and two that verify them."""
 
+FOUNDING: Final = (10, 40)
+"""Examples that found a mode, T of §3.2.2: where each verifies its function by `EXACT` bits, and where by half of them
+or less, as in the thesis."""
+
+VERIFYING: Final = 3
+"""Rows of a random sample beside one for each weight: one for the constant, and two that verify the function."""
+
 ENOUGH: Final = 16
 """Examples that tell roughly how large something is: a standard deviation to 18 %, 1 / sqrt(2 n)."""
 
@@ -163,6 +182,12 @@ explained by chance, what happens at a border."""
 
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold: two standard deviations, if errors are normal."""
+MAJORITY: Final = 0.5
+"""So large a share of them are most of them."""
+
+SMALL: Final = 0.1
+"""A tenth of something is a small part of it: what errs more by so much is as good, and what leaves no more of the
+changes than that explains them."""
 
 LITTLE: Final = 0.01
 """A hundredth of something is little beside it."""
@@ -188,6 +213,12 @@ two scenes, the fewest, half of the six rows verify a function of a present valu
 POWERS: Final = (1, 2, 3)
 """Powers of extents that inertia and shares may go with: length, area, volume."""
 
+FREQUENCIES: Final = (1, 2, 3)
+"""Multiples of an angle of which sines and cosines are offered as columns: higher ones are seldom seen in a law."""
+
+MOST_FEATURES: Final = 6_000
+"""Columns that are made of others, at most: of `MOST_ROWS` rows they take 144 MB, and a search takes minutes."""
+
 SUMMABLE: Final = 1e146
 """Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
 
@@ -209,7 +240,10 @@ SHORT: Final = 3
 ANSWERS: Final = 4_096
 """Answers of a kind that are remembered only to be quicker; before there are more, all are forgotten."""
 
-MOST_BYTES: Final = 32 << 20
+MEBIBYTE: Final = 1 << 20
+"""Bytes of what settings call a megabyte."""
+
+MOST_BYTES: Final = 32 * MEBIBYTE
 """Memory of what is remembered only to be quicker, and of one array that is worked on: a few of them fit anywhere."""
 
 LAYOUTS: Final = 256

@@ -15,7 +15,8 @@ def changed_at(wrong: Sequence[bool] | NDArray[np.bool_]) -> int | None:
     """From which step on something was wrong more often than before, if it was.
 
     Two shares of wrong steps, one up to some step and one from there on, are stated instead of one if that takes fewer
-    bits, those included that state the second share and where it begins (Rissanen 1983): ``1.5 * log2(n)``.
+    bits, those included that state the second share, half of ``log2(n)``, and where it begins, all of it (Rissanen
+    1983).
 
     Parameters
     ----------
@@ -43,7 +44,7 @@ def changed_at(wrong: Sequence[bool] | NDArray[np.bool_]) -> int | None:
     saved = _bits(misses[-1], count) - _bits(early, before) - _bits(late, after)
     saved[early * after >= late * before] = -np.inf
     best = int(np.argmax(saved))
-    return best + 1 if saved[best] > 1.5 * np.log2(count) else None
+    return best + 1 if saved[best] > (0.5 + 1.0) * np.log2(count) else None
 
 
 def _bits(misses: Any, of: Any) -> Any:

@@ -12,10 +12,6 @@ from relgym.config.constants import ALIKE, CACHED, MORE_ROOM, SUMMABLE
 
 __all__ = ["OnlineRidge", "in_order"]
 
-PENALTY = 1.0
-"""Of standardised columns: each weight is taken to be no larger than the noise a single row leaves, as scikit-learn's
-default has it. It keeps weights finite where columns depend on one another."""
-
 
 class OnlineRidge:
     """Least squares of several responses on the same columns, with an intercept.
@@ -111,7 +107,9 @@ class OnlineRidge:
         scaled = np.where(alive[:, None] & alive, covariance / (std_of[:, None] * std_of), 0.0)
         level = self._moments[:, 0] / n
         slope = np.where(alive, (self._moments[:, 1:] / n - level[:, None] * mean) / std_of, 0.0)
-        inverse = _inverse(scaled + (PENALTY / n) * np.eye(len(scaled)))
+        # The penalty is one: each weight of a standardised column is taken to be no larger than the noise that a single
+        # row leaves, as scikit-learn's default has it. It keeps weights finite where columns depend on one another.
+        inverse = _inverse(scaled + np.eye(len(scaled)) / n)
         solved = np.einsum("rj,ij->ri", slope, inverse) / std_of
         if np.isfinite(solved).all():
             self.mean = mean

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import IntEnum, auto
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from relgym.config.constants import (
 )
 from relgym.numeric.stepwise import (
     LinearFit,
+    choosing_cells,
     eliminate_backward,
     equal_gains,
     fitting_cells,
@@ -42,6 +44,14 @@ from relgym.numeric.stepwise import (
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["Consensus", "choose_columns", "consensus", "draw_samples", "extrapolated", "refine"]
+
+
+class _Style(IntEnum):
+    """Where a sample's rows come from but for the first: anywhere, its stratum, or the rows nearest to it in time."""
+
+    ANYWHERE = auto()
+    STRATUM = auto()
+    TIME = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,13 +87,13 @@ def draw_samples(
     ``(n, n)``: among many objects hardly two rows are in the same one.
     """
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
-    style = np.arange(draws) % 3
+    style = np.resize(list(_Style), draws)
     found = np.empty((draws, min(size, n)), dtype=np.intp)
     for part in _pieces(draws, CACHED, n):
         base, how = first[part], style[part]
         keys = rng.random((len(base), n))
         if strata is not None:
-            alike = np.flatnonzero(how == 1)
+            alike = np.flatnonzero(how == _Style.STRATUM)
             own = base[alike]
             other = strata[None, :] != strata[own][:, None]
             further = 2.0 * other
@@ -91,7 +101,7 @@ def draw_samples(
                 few = n - other.sum(axis=1) < size
                 further[few] = np.where(other[few], 1.0 + apart[own[few]], 0.0)
             keys[alike] += further
-        near = np.flatnonzero(how == 2)
+        near = np.flatnonzero(how == _Style.TIME)
         keys[near] += np.abs(np.arange(n)[None, :] - base[near][:, None]) // (2 * size)
         keys[np.arange(len(base)), base] = -1.0
         found[part] = np.argpartition(keys, min(size, n) - 1, axis=1)[:, :size]
@@ -218,7 +228,7 @@ def _forward_batch(
         chosen, left = choose(a, b - b.mean(axis=1, keepdims=True), terms, sigma, enough)
         chosen[left > enough, 0] = -2
         every[part] = chosen
-        yield CALL + 4 * a.size * max(terms, 1)
+        yield choosing_cells(a.size, terms)
     return every
 
 

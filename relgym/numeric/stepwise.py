@@ -19,11 +19,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, CALL, ROUNDED, WIDE
+from relgym.config.constants import ALIKE, CALL, ROUGH, ROUNDED, WIDE
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
     "LinearFit",
+    "choosing_cells",
     "eliminate_backward",
     "equal_gains",
     "fitting_cells",
@@ -111,6 +112,11 @@ def least_squares(
 def fitting_cells(rows: int, terms: int) -> int:
     """What `least_squares` of so many rows and terms costs, in cells: each term is taken out of all others, twice."""
     return CALL + terms * (CALL // 4 + rows * (terms + 1))
+
+
+def choosing_cells(cells: int, terms: int = 1) -> int:
+    """What it costs to choose so many columns among so many numbers: four passes over these for each."""
+    return CALL + 4 * cells * max(terms, 1)
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -258,7 +264,7 @@ def _choose(
         residual = residual - (q * residual).sum() * q
         a -= q[:, None] * (q[:, None] * a).sum(axis=0)
         a[:, best] = 0.0
-        yield CALL + 4 * a.size
+        yield choosing_cells(a.size)
     return chosen
 
 
@@ -291,8 +297,8 @@ def _choose_among_many(
 
 
 def equal_gains(noise: _Size, whole: _Size) -> _Size:
-    """Gains that differ by no more are equal: four times what noise leaves in the rows, or rounding of the whole."""
-    found: _Size = np.maximum(4.0 * noise, ROUNDED * whole)
+    """Gains that differ by no more are equal: `ROUGH` times what noise leaves in the rows, or rounding of the whole."""
+    found: _Size = np.maximum(ROUGH * noise, ROUNDED * whole)
     return found
 
 
@@ -315,7 +321,7 @@ def eliminate_backward(
     """
     while fit.terms:
         allowed = 2.0 * sigma**2 * (1.0 + len(y) * 0.02)
-        smaller = [_without(x, y, fit, k) for k in _needless(x, fit, 4.0 * allowed + fit.rss)]
+        smaller = [_without(x, y, fit, k) for k in _needless(x, fit, ROUGH * allowed + fit.rss)]
         if fit.intercept != 0.0:
             smaller.append(least_squares(x, y, fit.columns, intercept=False))
         yield (1 + len(smaller)) * fitting_cells(len(y), fit.terms)

@@ -16,11 +16,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config import ClassificationConfig
 from relgym.config.constants import CACHED, CALL, ROUNDED
 from relgym.errors import ConfigError
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["DecisionTree", "learn_tree"]
+
+_DEFAULT = ClassificationConfig()
 
 _Float1D: TypeAlias = NDArray[np.float64]
 _Float2D: TypeAlias = NDArray[np.float64]
@@ -138,8 +141,8 @@ def learn_tree(
     *,
     weights: _Float1D | None = None,
     columns: Sequence[str] | None = None,
-    min_leaf: int = 3,
-    max_depth: int = 6,
+    min_leaf: int = _DEFAULT.tree_min_leaf,
+    max_depth: int = _DEFAULT.tree_max_depth,
     prune: bool = True,
 ) -> Steps[DecisionTree]:
     """Learn a tree that tells positive from negative examples.

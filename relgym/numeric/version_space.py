@@ -7,6 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import SHORT
+
 __all__ = ["VersionSpace"]
 
 
@@ -60,7 +62,7 @@ class VersionSpace:
         *,
         rng: np.random.Generator,
         count: int = 64,
-        longest: int = 3,
+        longest: int = SHORT,
     ) -> None:
         self._least, self._most = positive.min(axis=0), positive.max(axis=0)
         both = np.concatenate([positive, negative])

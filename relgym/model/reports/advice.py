@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from relgym.clustering.approximation import LEFT, approximate, normal_reach, terms_of
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.features import MOST_FEATURES, library_of, offered, switched_on
+from relgym.clustering.features import library_of, offered, switched_on
 from relgym.clustering.mode import NOISE, sum_text
-from relgym.config.constants import NEARLY_ALL
+from relgym.config.constants import MOST_FEATURES, NEARLY_ALL
 from relgym.model.parts import Parts
 from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.reports.text import percent

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from relgym.clustering.clusterer import ModeClusterer
 from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
-from relgym.clustering.features import MOST_FEATURES
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import identify_roles
 from relgym.clustering.unification import reordered
@@ -27,6 +26,7 @@ from relgym.config.constants import (
     ALTERNATIVES,
     FIRST,
     LITTLE,
+    MOST_FEATURES,
     MOST_ROWS,
     OFTEN,
     RECENT,
