@@ -63,6 +63,7 @@ __all__ = [
     "least_examples",
     "plans",
     "searched",
+    "simplest",
     "verifying_bits",
 ]
 
@@ -218,7 +219,7 @@ def find_mode(
                 part = rows if lacking else None
                 told = yield from _law_of(x, y, found, part, columns, stages[0], needed, scale, config)
                 if told is not None:
-                    return told if present is None else _simplest(x, y, told, present, scale)
+                    return told if present is None else simplest(x, y, told, present, scale)
         if orders is not None and stages[0] < columns <= WIDE:
             fresher = int((rows >= len(y) - fresh).sum())
             found = yield from _in_any_order(
@@ -240,7 +241,7 @@ def find_mode(
     return None
 
 
-def _simplest(
+def simplest(
     x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, present: int, scale: Scale
 ) -> Consensus:
     """A function, or that nothing changes if that takes fewer bits: it has no number that must be told.
@@ -248,6 +249,15 @@ def _simplest(
     Told of a function are its numbers, the values of the rows that it doesn't explain while the other one does, and
     what both leave of the others; each number and each value in so many bits as it takes to tell values apart. So of a
     flag that was set once, when another one was set, it isn't said that it is the other one.
+
+    Parameters
+    ----------
+    x, y, found
+        All rows, and the function with those it explains.
+    present
+        The column of the property's present value.
+    scale
+        Noise and tolerances.
     """
     stays = np.abs(y - x[:, present]) <= scale.tolerance
     both, bits = stays & found.inliers, verifying_bits(y, scale)

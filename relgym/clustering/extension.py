@@ -19,10 +19,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.clustering.discovery import counts, least_examples, verifying_bits
+from relgym.clustering.discovery import counts, least_examples, simplest, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
 from relgym.config.constants import ENOUGH, EVIDENCE, EXACT, MOST_ROWS, ROUNDED, SEARCHED_ROWS
+from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
@@ -67,22 +68,19 @@ def extended(
     if is_flag(known.y):
         value = float(known.y[pool[-1]])
         half = least_examples(known.y, known.scale, known.config) / 2
-        alike = int((known.y[pool] == value).sum())
-        if alike >= max(2, half):
-            slots, own = known.table.signatures[signature], known.target.property
-            if slots.has(0, own):  # that it stays takes no number, and so may leave an example more
-                column = slots.column(0, own)
-                stays = int((known.table.x[known.rows[pool], column] == known.y[pool]).sum())
-                if stays + bool(value) > alike:
-                    return LinearFit((column,), (1.0,), 0.0, 0.0)
-            return LinearFit((), (), value, 0.0)
+        alike = known.y[pool] == value
+        if alike.sum() >= max(2, half):
+            constant, slots = LinearFit((), (), value, 0.0), known.table.signatures[signature]
+            if not slots.has(0, known.target.property):
+                return constant
+            order = np.array([slots.column(0, known.target.property)])
+            x, told = known.table.x[known.rows[pool][:, None], order], Consensus(constant, alike)
+            return reordered(simplest(x, known.y[pool], told, 0, known.scale).fit, order)
     if not known.clusters:
         return None
     pool, exact = pool[-SEARCHED_ROWS:], bits >= EXACT and not flags
-    counting = counts(
-        known.y, known.scale, MOST_ROWS
-    )  # where whole numbers agree, they often do so by chance
-    if counting and not exact:
+    counting = counts(known.y, known.scale, MOST_ROWS)
+    if counting and not exact:  # where whole numbers agree, they often do so by chance
         return None
     for i in sorted(known.clusters, key=lambda k: (-known.clusters[k].fitted, k)):
         members = known.members(i)
@@ -162,9 +160,8 @@ def _flags(values: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _constant(members: NDArray[np.float64], new: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which columns may be constant among a mode's members and not in some new row: others needn't be looked at."""
     low, high = members.min(axis=0), members.max(axis=0)
-    reach = np.maximum(
-        new.max(axis=0) - low, high - new.min(axis=0)
-    )  # no new row lies further from their median
+    # No new row lies further from their median.
+    reach = np.maximum(new.max(axis=0) - low, high - new.min(axis=0))
     found: NDArray[np.bool_] = (reach > 0.0) & (high - low <= 2.0 * ROUNDED * reach)
     return found
 
