@@ -39,9 +39,6 @@ from relgym.scheduling.work import Task
 
 __all__ = ["LastResort", "Resort", "last_resort", "timely"]
 
-BETTER = 0.95
-"""An approximation gives way to one whose errors are smaller by this factor, or to a shorter one that is as good."""
-
 
 @dataclass(frozen=True, slots=True)
 class LastResort:
@@ -154,7 +151,7 @@ def _accepted(
         shorter = found.fit.terms < sum(c.mode.parameters for c in modes)
         if modes:
             new, old = reach(own, floor), reach(np.min(errors, axis=0), floor)
-            if not as_good(new, old) if shorter else new > BETTER * old:
+            if not as_good(new, old) if shorter else as_good(old, new):
                 return None
     elif 2 * population.noise_examples <= population.seen:
         spread = max(float((y - slots.present(table.x[rows], population.target)).std()), found.sigma)
