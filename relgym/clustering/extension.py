@@ -14,22 +14,17 @@ of its other value, and half as many as found a mode are enough.
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.discovery import counts, least_examples, simplest, verifying_bits
 from relgym.clustering.merging import Known
 from relgym.clustering.unification import reordered
-from relgym.config.constants import ENOUGH, EVIDENCE, EXACT, MOST_ROWS, ROUNDED, SEARCHED_ROWS
+from relgym.config.constants import ENOUGH, EVIDENCE, EXACT, LITTLE, MOST_ROWS, ROUNDED, SEARCHED_ROWS
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
 __all__ = ["extended", "is_flag"]
-
-APART: Final = 1e-3
-"""Examples whose values differ by less, relative to what they differ from the constant, verify nothing."""
 
 
 def extended(
@@ -196,9 +191,9 @@ def _agreeing(
     weight = float(left[lead]) / start
     fits = np.abs(left - weight * off) <= tolerance
     fits[:members] = False
-    fits &= np.abs(off) > APART * abs(start)
+    fits &= np.abs(off) > LITTLE * abs(start)  # what differs little from the constant verifies nothing
     verify = fits & (np.arange(len(fits)) != lead)
     if told is None:
-        verify &= np.abs(off - start) > APART * abs(start)
+        verify &= np.abs(off - start) > LITTLE * abs(start)  # nor does what hardly differs from what leads
     confirmed = any(abs(float(left[lead]) - w * start) <= tolerance for w in told or ())
     return np.flatnonzero(fits) if confirmed or verify.any() else None
