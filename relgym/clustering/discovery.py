@@ -399,17 +399,18 @@ def likeness(x: NDArray[np.float64], left: NDArray[np.float64]) -> float:
 def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, int, int]]:
     """(columns, terms, sample size) of the searches, cheapest first."""
     found = []
-    most = config.max_terms
+    most, half = config.max_terms, config.max_terms // 2
     for width in stages[:1] if config.own_only else stages:
         if width > WIDE:
             # Among so many columns a small sample finds some that fit it by chance; no constant does.
-            found += [(width, 0, 4)] if width == stages[0] else []
-            found += [(width, min(t, most), 4 * min(t, most) + 8) for t in (3, most)]
+            found += [(width, 0, FEWEST)] if width == stages[0] else []
+            found += [(width, terms, FEWEST * (terms + VERIFYING)) for terms in (half, most)]
             continue
         if width <= 6:  # few enough to fit them all and drop what is needless
-            found.append((width, min(width, most), min(width, most) + VERIFYING))
+            found.append((width, min(width, most), min(width, most) + 1 + VERIFYING))
         else:
-            found += [(width, min(t, most), s) for t, s in ((2, 5), (5, 12), (most, 3 * most))]
+            found.append((width, min(2, most), 2 + 1 + VERIFYING))
+            found += [(width, terms, terms * (1 + VERIFYING)) for terms in (half, most) if terms > 2]
     return found
 
 

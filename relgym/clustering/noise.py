@@ -12,13 +12,10 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, NEARLY_ALL, RECENT, ROUGH, ROUNDINGS, TOLD
+from relgym.config.constants import ENOUGH, NEARLY_ALL, RECENT, ROUGH, ROUNDINGS, TOLD, VERIFYING
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
-
-TERMS = ENOUGH // 3
-"""Most weights of a local function."""
 
 SELECTED = 3.0
 """Choosing the best of many columns lowers the spread of pure noise by at most about this factor."""
@@ -107,10 +104,11 @@ def estimate_noise(
     windows = _windows(strata)
     if not windows:
         return None
+    terms = ENOUGH // (1 + VERIFYING)
     simple = _quartile(
-        [_spread(x[part], y[part], tuple(range(min(own, x.shape[1], TERMS)))) for part in windows]
+        [_spread(x[part], y[part], tuple(range(min(own, x.shape[1], terms)))) for part in windows]
     )
-    sparse = _quartile([_least_spread(x[part], y[part], floor) for part in windows])
+    sparse = _quartile([_least_spread(x[part], y[part], floor, terms) for part in windows])
     estimate = simple if simple <= SELECTED * sparse else sparse
     return estimate if estimate > ROUGH * floor else floor
 
@@ -133,9 +131,11 @@ def _spread(x: NDArray[np.float64], y: NDArray[np.float64], columns: tuple[int, 
     return float(np.sqrt(fit.rss / freedom)), freedom
 
 
-def _least_spread(x: NDArray[np.float64], y: NDArray[np.float64], floor: float) -> tuple[float, int]:
+def _least_spread(
+    x: NDArray[np.float64], y: NDArray[np.float64], floor: float, terms: int
+) -> tuple[float, int]:
     """The same about the best sparse function of any columns."""
-    fit = forward_stepwise(x, y, sigma=floor, max_terms=TERMS, eliminate=False)
+    fit = forward_stepwise(x, y, sigma=floor, max_terms=terms, eliminate=False)
     freedom = len(y) - len(fit.columns) - 1
     return float(np.sqrt(fit.rss / freedom)), freedom
 

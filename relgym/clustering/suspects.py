@@ -128,7 +128,7 @@ def likeliest(
     widest = min(2, most, width)
     sets = [columns for terms in range(widest + 1) for columns in combinations(range(width), terms)]
     forms = [(columns, constant) for columns in sets for constant in (True, False) if columns or constant]
-    size = widest + VERIFYING
+    size = widest + 1 + VERIFYING
     if len(y) < 2 * size:
         return None
     draws = int(np.clip(TRIALS // len(forms), ENOUGH, DRAWS))

@@ -155,13 +155,13 @@ def unified_family(
                 sigma=scale.sigma,
                 tolerance=scale.tolerance,
                 terms=terms,
-                size=terms + VERIFYING,
+                size=terms + 1 + VERIFYING,
                 draws=2 * config.draws,
                 rng=rng,
                 anchors=np.array([len(usable) - 1]),
                 misfit=scale.misfit,
             )
-            if found is None or found.size < found.fit.terms + VERIFYING:
+            if found is None or found.size < found.fit.terms + 1 + VERIFYING:
                 continue
             which = [int(k) for k in usable[found.inliers]]
             pooled = np.concatenate([_spread(families[k]) for k in which])

@@ -154,8 +154,9 @@ FOUNDING: Final = (10, 40)
 """Examples that found a mode, T of §3.2.2: where each verifies its function by `EXACT` bits, and where by half of them
 or less, as in the thesis."""
 
-VERIFYING: Final = 3
-"""Rows of a random sample beside one for each weight: one for the constant, and two that verify the function."""
+VERIFYING: Final = 2
+"""Rows of a random sample that verify a function, besides those that fix its numbers: the second one shows most of
+what the first one agrees with by chance. Of many terms, chosen among many columns, so many verify each."""
 
 ENOUGH: Final = 16
 """Examples that tell roughly how large something is: a standard deviation to 18 %, 1 / sqrt(2 n)."""

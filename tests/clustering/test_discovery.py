@@ -117,7 +117,7 @@ def test_exact_data_need_ten_examples_and_noisy_ones_forty(rng: np.random.Genera
 
 
 def test_searches_go_from_few_columns_to_many() -> None:
-    assert plans((3, 29), CONFIG) == [(3, 3, 6), (29, 2, 5), (29, 5, 12), (29, 8, 24)]
+    assert plans((3, 29), CONFIG) == [(3, 3, 6), (29, 2, 5), (29, 4, 12), (29, 8, 24)]
     assert plans((3, 29), ClusteringConfig(own_only=True)) == [(3, 3, 6)]
 
 
