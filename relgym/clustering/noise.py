@@ -12,16 +12,20 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, NEARLY_ALL, RECENT, ROUGH, ROUNDINGS, TOLD, VERIFYING
+from relgym.config.constants import (
+    ENOUGH,
+    NEARLY_ALL,
+    RECENT,
+    ROUGH,
+    ROUNDED,
+    ROUNDINGS,
+    SEARCHED_ROWS,
+    TOLD,
+    VERIFYING,
+)
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
 __all__ = ["estimate_noise", "refuted", "rounding_noise"]
-
-SELECTED = 3.0
-"""Choosing the best of many columns lowers the spread of pure noise by at most about this factor."""
-
-MOST_WINDOWS = 24
-"""At most about this many windows are looked at."""
 
 
 def rounding_noise(
@@ -49,7 +53,7 @@ def rounding_noise(
         return single * max(largest, float(np.finfo(np.float32).tiny))
     if recent is not None and _rounded(recent):
         return single * max(largest, 1.0)
-    scale = max(float(np.abs(x).max(initial=0.0)), largest, 1e-3)
+    scale = max(float(np.abs(x).max(initial=0.0)), largest, ROUNDED)
     return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
 
 
@@ -83,8 +87,8 @@ def estimate_noise(
     in such a window is noise. Windows that straddle a change of mode leave more, hence the lower quartile; it is
     corrected for what a quartile of so many spreads of so few examples falls short by.
 
-    Where the target's own columns leave no more than other objects' could explain away by chance, they make the
-    function. Choosing among many columns finds some that fit the noise, and underrates it.
+    Where the target's own columns leave no more than other objects' could explain away by chance, `ROUGH` times as much
+    at most, they make the function. Choosing among many columns finds some that fit the noise, and underrates it.
 
     Parameters
     ----------
@@ -109,19 +113,19 @@ def estimate_noise(
         [_spread(x[part], y[part], tuple(range(min(own, x.shape[1], terms)))) for part in windows]
     )
     sparse = _quartile([_least_spread(x[part], y[part], floor, terms) for part in windows])
-    estimate = simple if simple <= SELECTED * sparse else sparse
+    estimate = simple if simple <= ROUGH * sparse else sparse
     return estimate if estimate > ROUGH * floor else floor
 
 
 def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
-    """Runs of consecutive examples of one stratum, other examples in between left out."""
+    """Runs of consecutive examples of one stratum, other examples in between left out: `SEARCHED_ROWS` rows."""
     found = []
     for stratum in np.unique(strata):
         members = np.flatnonzero(strata == stratum)
         ends = range(ENOUGH, len(members) + 1, ENOUGH)
         found += [members[end - ENOUGH : end] for end in ends]
     found.sort(key=lambda window: int(window[0]))
-    return found[:: len(found) // MOST_WINDOWS + 1]
+    return found[:: len(found) // (SEARCHED_ROWS // ENOUGH) + 1]
 
 
 def _spread(x: NDArray[np.float64], y: NDArray[np.float64], columns: tuple[int, ...]) -> tuple[float, int]:
