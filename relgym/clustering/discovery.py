@@ -70,9 +70,6 @@ __all__ = [
 NEAR = 16.0
 """Rows that miss a function by up to so many tails are near misses."""
 
-CHANGES = 0.2
-"""A column that changes between so large a share of successive rows is no constant of a scene."""
-
 
 @dataclass(frozen=True, slots=True)
 class Scale:
@@ -533,8 +530,8 @@ def _leverage(x: NDArray[np.float64], fit: LinearFit, column: int) -> NDArray[np
 
 
 def _lively(column: NDArray[np.float64]) -> bool:
-    """Whether a column changes often, as an agent's choice among a few actions does."""
-    return bool((np.diff(column) != 0.0).mean() >= CHANGES)
+    """Whether a column changes often, as an agent's choice among a few actions does, and is no constant of a scene."""
+    return bool((np.diff(column) != 0.0).mean() * SCENE_ROWS >= 1.0)
 
 
 def verifying_combinations(weights: int, combinations: int, columns: int, told: float) -> int:
