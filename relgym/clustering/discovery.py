@@ -30,6 +30,7 @@ from relgym.config.constants import (
     ALIKE,
     CALL,
     EXACT,
+    EXTRAPOLATED,
     FEW_VALUES,
     FEWEST,
     FOUNDING,
@@ -67,9 +68,6 @@ __all__ = [
     "verifying_bits",
 ]
 
-NEAR = 16.0
-"""Rows that miss a function by up to so many tails are near misses."""
-
 
 @dataclass(frozen=True, slots=True)
 class Scale:
@@ -95,6 +93,11 @@ class Scale:
     def tolerance(self) -> float:
         """Largest residual of an example that a function explains."""
         return self.inlier_stds * self.sigma
+
+    @property
+    def near(self) -> float:
+        """Residual up to which an example is a near miss: what the extrapolation of any few rows is allowed."""
+        return EXTRAPOLATED * self.sigma
 
     @property
     def surprising(self) -> float:
@@ -331,7 +334,7 @@ def _complete(
     A few rows don't show a term that is small beside their function's: what they leave of it is within what the
     extrapolation of any function of so few rows is allowed. It makes near misses of the others.
     """
-    reach = NEAR * scale.tail
+    reach = scale.near
     while True:
         near = np.abs(y - fit.predict(x)) <= reach
         if near.sum() <= terms + 1:
@@ -359,7 +362,7 @@ def is_law(x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, own
         Noise and tolerances.
     """
     error = np.abs(y - found.fit.predict(x))
-    near = (error > scale.tail) & (error <= NEAR * scale.tail)
+    near = (error > scale.tail) & (error <= scale.near)
     if int(near.sum()) > MAJORITY * found.size:
         return False
     rows = np.flatnonzero(found.inliers)

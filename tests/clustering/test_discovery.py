@@ -304,11 +304,11 @@ def test_a_mode_searched_for_in_pieces_is_the_one_found_at_once(kind: str) -> No
 
 # ---------------------------------------------------------------------- laws and tangents
 def test_a_tangent_is_given_away_by_near_misses() -> None:
-    # Tail 8 σ; near misses are those up to 16 tails. Twenty are explained, so ten near misses are no more than half.
+    # Tail 8 σ; near misses are those up to 100 σ. Twenty are explained, so ten near misses are no more than half.
     scale = Scale(1.0, 4.0, 8.0)
     fit = LinearFit((), (), 0.0, 0.0)
     for misses, law in ((10, True), (11, False)):
-        y = np.r_[np.zeros(20), np.full(misses, 128.0), np.full(50, 129.0), np.full(50, 7.9)]
+        y = np.r_[np.zeros(20), np.full(misses, 100.0), np.full(50, 101.0), np.full(50, 7.9)]
         found = Consensus(fit, np.arange(len(y)) < 20)
         assert is_law(np.zeros((len(y), 1)), y, found, 1, scale) is law
 
