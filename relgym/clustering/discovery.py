@@ -211,7 +211,7 @@ def find_mode(
             limit=SAMPLES_TRIED if columns <= WIDE else SAMPLES_ALIKE,
             misfit=scale.misfit,
         )
-        if found is not None and found.size >= min(needed, 6):
+        if found is not None and found.size >= FEWEST:
             found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
             if found is not None and found.size >= needed:
                 lacking = number >= len(simple) and columns > completed
