@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -233,7 +234,7 @@ class ModeSearch:
         lost = dear and population.seen >= RECENT and 2 * population.noise_examples > population.seen
         if population.approximate or lost:  # what an approximation leaves is mostly its own tail
             return search.failures * search.failures
-        return search.failures if doubtful else search.failures // 6
+        return search.failures if doubtful else math.isqrt(search.failures)
 
     def _newest(self, table: ExampleTable, signature: int) -> NDArray[np.intp]:
         """The end of `_pool`, all that `extended` looks at: found without a look at everything that is remembered."""
