@@ -297,7 +297,8 @@ class ModeSearch:
             scale=population.scale,
             spread=float(np.ptp(population.y)),
         )
-        found = likeliest(evidence, strata[part], rng=self._rng, most=population.config.max_terms)
+        config = population.config
+        found = likeliest(evidence, strata[part], rng=self._rng, draws=config.draws, most=config.max_terms)
         if found is None:
             return None
         taken = examples[part[evidence.close(found) & (known[part] > population.scale.surprising)]]

@@ -22,9 +22,6 @@ from relgym.numeric.stepwise import LinearFit, least_squares
 
 __all__ = ["Evidence", "likeliest", "suspects"]
 
-TRIALS = 2_000
-"""Functions tried on samples: about so many in all, from `ENOUGH` samples to `DRAWS`."""
-
 
 def suspects(strata: NDArray[np.integer], errors: NDArray[np.float64], scale: Scale) -> NDArray[np.intp]:
     """Examples of relational states in which the known modes' errors are larger than the noise explains, oldest first.
@@ -104,7 +101,12 @@ class Evidence:
 
 
 def likeliest(
-    evidence: Evidence, strata: NDArray[np.integer], *, rng: np.random.Generator, most: int
+    evidence: Evidence,
+    strata: NDArray[np.integer],
+    *,
+    rng: np.random.Generator,
+    draws: int,
+    most: int,
 ) -> LinearFit | None:
     """The function of most evidence among random samples' functions and their refinements; None if none convinces.
 
@@ -116,12 +118,14 @@ def likeliest(
         Their relational states, shape ``(n,)``.
     rng
         Draws the samples.
+    draws
+        Functions tried on samples: about so many in all, of `ENOUGH` samples to `DRAWS`.
     most
         Most columns of a function.
 
     Notes
     -----
-    Cost O(`TRIALS` * n); functions of samples have two columns at most, refinements may have more.
+    Cost O(draws * n); functions of samples have two columns at most, refinements may have more.
     """
     x, y = evidence.x, evidence.y
     width = x.shape[1]
@@ -131,9 +135,9 @@ def likeliest(
     size = widest + 1 + VERIFYING
     if len(y) < 2 * size:
         return None
-    draws = int(np.clip(TRIALS // len(forms), ENOUGH, DRAWS))
+    samples = int(np.clip(draws // len(forms), ENOUGH, DRAWS))
     best, bits = None, -np.inf
-    for sample in draw_samples(len(y), size, draws, rng=rng, strata=strata):
+    for sample in draw_samples(len(y), size, samples, rng=rng, strata=strata):
         for columns, constant in forms:
             fit = least_squares(x[sample], y[sample], columns, intercept=constant)
             if (now := evidence.of(fit)) > bits:

@@ -77,7 +77,7 @@ def test_a_law_is_found_whose_examples_others_mostly_explain(rng: np.random.Gene
     assert (known <= SCALE.tolerance).mean() > 0.5
     assert (known > SCALE.tail).sum() < 20  # what is left of it, where forty examples found a mode
     evidence = Evidence(x, y, known, scale=SCALE, spread=float(np.ptp(y)))
-    found = likeliest(evidence, np.zeros(80, dtype=int), rng=rng, most=8)
+    found = likeliest(evidence, np.zeros(80, dtype=int), rng=rng, draws=1_536, most=8)
     assert found is not None
     assert found.columns == (0, 1)
     assert found.weights == pytest.approx((0.5, -0.8), abs=0.1)
@@ -91,13 +91,13 @@ def test_examples_of_known_modes_convince_of_no_other(seed: int) -> None:
     y = np.where(rng.random(60) < 0.5, x[:, 0], 0.0) + rng.normal(scale=SIGMA, size=60)
     known = np.minimum(np.abs(y - x[:, 0]), np.abs(y))
     evidence = Evidence(x, y, known, scale=SCALE, spread=float(np.ptp(y)))
-    assert likeliest(evidence, np.zeros(60, dtype=int), rng=rng, most=8) is None
+    assert likeliest(evidence, np.zeros(60, dtype=int), rng=rng, draws=1_536, most=8) is None
 
 
 def test_few_examples_convince_of_nothing(rng: np.random.Generator) -> None:
     x, y, _ = hidden(rng, 6)
     evidence = Evidence(x, y, np.full(6, math.inf), scale=SCALE, spread=3.0)
-    assert likeliest(evidence, np.zeros(6, dtype=int), rng=rng, most=8) is None
+    assert likeliest(evidence, np.zeros(6, dtype=int), rng=rng, draws=1_536, most=8) is None
 
 
 # ---------------------------------------------------------------------- in a stream
