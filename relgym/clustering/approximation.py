@@ -53,10 +53,6 @@ LEFT: Final = SMALL
 """Largest share of the change's standard deviation that an approximation may leave: with features that were asked
 for, and without any, where a coarse linear function would pass for a law."""
 
-SERVED: Final = 0.7
-"""Of the rows that a term serves, by more than noise, so large a share must be explained where they are few, fewer than
-may be left unexplained: else it isn't their law."""
-
 
 @dataclass(frozen=True, slots=True)
 class Approximation:
@@ -219,13 +215,17 @@ class _Search:
         return explained
 
     def _lawless(self, fit: LinearFit, explained: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Rows served by terms that serve few rows and are not their law, shape ``(n,)``."""
+        """Rows served by terms that serve few rows and are not their law, shape ``(n,)``.
+
+        Few are fewer than may be left unexplained, and a term is their law if most of them are explained. What it
+        contributes less than noise to isn't served.
+        """
         least = self._sigma(fit, explained)
         found = np.zeros(len(self.y), dtype=np.bool_)
         for column, weight in zip(fit.columns, fit.weights, strict=True):
             values = self.x[:, column]
             served = np.abs(weight * (values - np.median(values))) > least
-            if 0.0 < served.mean() < 1.0 - NEARLY_ALL and explained[served].mean() < SERVED:
+            if 0.0 < served.mean() < 1.0 - NEARLY_ALL and explained[served].mean() < MAJORITY:
                 found |= served
         return found
 
