@@ -203,7 +203,9 @@ def find_mode(
             tolerance=scale.tolerance,
             terms=terms,
             size=size,
-            draws=max(32, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)),
+            draws=max(
+                SAMPLES_TRIED, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)
+            ),
             rng=rng,
             strata=strata[rows],
             apart=apart,
