@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, CALL, ROUGH, ROUNDED, WIDE
+from relgym.config.constants import ALIKE, CALL, LEFT_OPEN, ROUGH, ROUNDED, WIDE
 from relgym.scheduling.work import Steps, resumable
 
 __all__ = [
@@ -317,10 +317,12 @@ def eliminate_backward(
 ) -> Steps[LinearFit]:
     """Drop terms, the constant included, as long as that raises Cp by less than it saves.
 
+    And by no more than as many examples would as a law may leave open.
+
     Later columns are tried first, so that of two interchangeable ones the earlier stays.
     """
     while fit.terms:
-        allowed = 2.0 * sigma**2 * (1.0 + len(y) * 0.02)
+        allowed = 2.0 * sigma**2 * (1.0 + LEFT_OPEN * len(y))
         smaller = [_without(x, y, fit, k) for k in _needless(x, fit, ROUGH * allowed + fit.rss)]
         if fit.intercept != 0.0:
             smaller.append(least_squares(x, y, fit.columns, intercept=False))
