@@ -11,20 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALTERNATIVES, ROUNDED
+from relgym.config.constants import ALTERNATIVES, ROUNDED, SEARCHED_CELLS
 
 __all__ = ["Rule", "decision_list"]
-
-BEAM: Final = 12
-"""So many conjunctions are grown at once."""
-
-TRIED, MOST_TRIES = 2, 800
-"""So many lists, the shortest, are improved, with so many changes at most."""
 
 _Bools = NDArray[np.bool_]
 _Floats = NDArray[np.float64]
@@ -82,8 +75,9 @@ def decision_list(
 
     Notes
     -----
-    The commonest labels are tried as the default; of the lists found the cheapest is returned. Cost
-    O(labels * rules * `BEAM` * distinct rows * conditions).
+    The commonest labels are tried as the default, the shortest lists are improved, each with changes that look at
+    `SEARCHED_CELLS` numbers at most, and of those found the cheapest is returned. Cost
+    O(labels * rules * `ALTERNATIVES` * distinct rows * conditions).
     """
     prices = np.ones(truth.shape[1]) if cost is None else np.asarray(cost, dtype=np.float64)
     rows, labels, heavy, unsure = _distinct(truth, allowed, weights, doubtful)
@@ -105,7 +99,7 @@ def decision_list(
             drafts.append((table.price(rules), -float(heavy[labels[:, default]].sum()), default, rules))
     drafts.sort(key=lambda each: each[:3])
     found = []
-    for _, share, default, rules in drafts[:TRIED]:
+    for _, share, default, rules in drafts[:ALTERNATIVES]:
         better = _improved(table, rules, default)
         found.append((table.price(better), share, default, better))
     _, _, default, rules = min(found, key=lambda each: each[:3])
@@ -245,12 +239,12 @@ def _conjunction(
             row, k = divmod(int(np.argmax(value)), count)
             return float(value[row, k]), tuple(sorted((*beam[row], k)))
         # What holds of most rows that it gains, and of few others, is promising.
-        promise = np.log2(1.0 + gain) - 2.0 * np.log2(1.0 + wrong) - 0.25 * price
+        promise = np.log2(1.0 + gain) - 2.0 * np.log2(1.0 + wrong)
         promise[gain <= 0.0] = -np.inf
         grown: dict[tuple[int, ...], None] = {}
-        for place in np.argsort(-promise, axis=None, kind="stable")[: BEAM * BEAM].tolist():
+        for place in np.argsort(-promise, axis=None, kind="stable")[: ALTERNATIVES**2].tolist():
             row, k = divmod(place, count)
-            if promise[row, k] == -np.inf or len(grown) == BEAM:
+            if promise[row, k] == -np.inf or len(grown) == ALTERNATIVES:
                 break
             grown[tuple(sorted((*beam[row], k)))] = None
         if not grown:
@@ -261,12 +255,12 @@ def _conjunction(
 
 def _improved(table: _Table, rules: list[_Draft], default: int) -> list[_Draft]:
     """The rules in an order, and with tests in others' places, that let more of them be left out."""
-    price, tries, better = table.price(rules), 0, True
-    while better and tries < MOST_TRIES:
+    price, cells, better = table.price(rules), 0, True
+    while better and cells < SEARCHED_CELLS:
         better = False
         for changed in _variants(rules):
-            tries += 1
-            if tries >= MOST_TRIES:
+            cells += len(table.heavy) * len(rules)
+            if cells >= SEARCHED_CELLS:
                 break
             if not table.right(changed, default):
                 continue
