@@ -19,15 +19,12 @@ from relgym.clustering.mode_search import ModeSearch
 from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SELDOM
+from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SEARCHED_CELLS, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.renewal import due
 
 __all__ = ["ClusterReport", "ModeClusterer"]
-
-ESTIMATE = 1_500_000
-"""What an estimate of the noise costs, in cells."""
 
 
 class ModeClusterer:
@@ -274,7 +271,7 @@ class ModeClusterer:
         self.floor = floor
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:
-            budget.spend(ESTIMATE)
+            budget.spend(2 * SEARCHED_CELLS)  # two kinds of functions: each takes a look at as many numbers
             estimate = self._estimate(table, floor)
             if estimate is not None and self._refutes(estimate):
                 self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False
