@@ -16,7 +16,7 @@ from source_tree import ROOT, Module
 
 MOST = {
     "classification": (3, 1),
-    "clustering": (12, 19),
+    "clustering": (2, 7),
     "hypotheses": (0, 0),
     "laws": (19, 22),
     "logic": (6, 3),
