@@ -411,7 +411,7 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
         if width <= 6:  # few enough to fit them all and drop what is needless
             found.append((width, min(width, most), min(width, most) + 1 + VERIFYING))
         else:
-            found.append((width, min(2, most), 2 + 1 + VERIFYING))
+            found.append((width, min(2, most), 2 + 1 + VERIFYING))  # two weights and a constant
             found += [(width, terms, terms * (1 + VERIFYING)) for terms in (half, most) if terms > 2]
     return found
 

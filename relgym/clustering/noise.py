@@ -118,7 +118,7 @@ def estimate_noise(
 
 
 def _windows(strata: NDArray[np.integer]) -> list[NDArray[np.intp]]:
-    """Runs of consecutive examples of one stratum, other examples in between left out: `SEARCHED_ROWS` rows."""
+    """Runs of `ENOUGH` examples of one stratum, others in between left out; `SEARCHED_ROWS` examples in all at most."""
     found = []
     for stratum in np.unique(strata):
         members = np.flatnonzero(strata == stratum)
