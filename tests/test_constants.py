@@ -18,7 +18,7 @@ MOST = {
     "classification": (3, 1),
     "clustering": (2, 7),
     "hypotheses": (0, 0),
-    "laws": (19, 22),
+    "laws": (16, 7),
     "logic": (6, 3),
     "model": (11, 2),
     "numeric": (0, 5),

@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import ENOUGH
+from relgym.scene.axes import WORLD
 
 __all__ = ["Drift"]
-
-INDEPENDENT = 1.0
-"""Least ratio of the variances of e and d at which changes count as noise: halfway from equal to independent ones."""
 
 
 @dataclass(slots=True)
@@ -35,7 +33,7 @@ class Drift:
 
     count: int = 0
     pairs: int = 0
-    total: list[float] = field(default_factory=lambda: [0.0] * 3)
+    total: list[float] = field(default_factory=lambda: [0.0] * len(WORLD))
     squares: float = 0.0
     steps: float = 0.0
     _last: dict[str, tuple[list[float], list[float]]] = field(default_factory=dict)
@@ -59,7 +57,8 @@ class Drift:
         if self.pairs < ENOUGH:
             return True
         variance = self.squares / self.count - sum([(t / self.count) * (t / self.count) for t in self.total])
-        return self.steps / self.pairs >= INDEPENDENT * variance
+        # The squares of e are none where changes are equal, and twice the variance where they are independent.
+        return self.steps / self.pairs >= variance
 
     def to_json(self) -> list[float | int | list[float]]:
         """Plain data that `restore` reads back; a change begins a new run."""

@@ -18,7 +18,7 @@ from relgym.laws.records import Kind, Share
 from relgym.laws.shares import EXTENT, find_share
 from relgym.laws.store import Store
 from relgym.laws.touching import Cast, Contacts
-from relgym.scene.axes import Axes
+from relgym.scene.axes import WORLD, Axes
 from relgym.scene.geometry.vectors import FloatArray
 from relgym.scene.schema import SceneSchema
 
@@ -62,7 +62,7 @@ class EncounterStore:
         columns = max((len(s.names) for s in sources.values()), default=0)
         widths = {
             "kind": 1, "now_a": moving, "now_b": moving, "after_a": moving, "after_b": moving,
-            "normal": d, "centres": d, "angles": 3, "arm_a": 1, "arm_b": 1, "extent_a": 1, "extent_b": 1,
+            "normal": d, "centres": d, "angles": len(WORLD), "arm_a": 1, "arm_b": 1, "extent_a": 1, "extent_b": 1,
             "x_a": columns, "x_b": columns,
         }  # fmt: skip
         ends = np.cumsum(list(widths.values())).tolist()

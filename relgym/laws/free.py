@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, ROUNDED, ROUNDINGS, TYPICAL
+from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, ROUNDED, ROUNDINGS, STDS, TYPICAL
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
 from relgym.laws.regions import find_laws, find_regions
-from relgym.laws.store import Store
+from relgym.laws.store import Store, Stream
 from relgym.numeric.changes import changed_at
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit, forward_stepwise
@@ -63,7 +63,7 @@ class FreeLearner:
         self.law: FreeLaw | None = None
         self._d = len(sources.moving)
         self.store = Store(len(sources.names) + self._d, KEPT, seed=seed)
-        self._rng = np.random.default_rng([seed, 1])
+        self._rng = np.random.default_rng([seed, Stream.FREE])
         self._news = 0
 
     @property
@@ -226,7 +226,7 @@ class FreeLearner:
         """
         order = list(self.sources.preference(k))
         names = [self.sources.names[c] for c in order]
-        columns, sigma = x[:, order], tolerance / 4.0
+        columns, sigma = x[:, order], tolerance / STDS
         steady = float(np.median(y - columns[:, 0]))
         forms = [
             Piece(((names[0], 1.0),)),

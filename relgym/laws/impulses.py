@@ -88,11 +88,11 @@ class Solved:
 def table_of(law: AxisLaw, axis: int, letters: tuple[str, ...], pieces: int) -> tuple[FloatArray, float]:
     """A law's pieces as weights on `FEATURES`, shape ``(pieces, 6)``, and its sign."""
     own, other = letters[axis], letters[1 - axis]
-    names = {f"u_{own}": 0, f"v_{own}": 1, f"u_{other}": 2, f"v_{other}": 3, "J_n": 4, ONE: 5}
+    read = (f"u_{own}", f"v_{own}", f"u_{other}", f"v_{other}", "J_n", ONE)
     table = np.zeros((pieces, len(FEATURES)))
     for k in range(pieces):
         for name, weight in law.pieces[min(k, len(law.pieces) - 1)].terms:
-            table[k, names[name]] += weight
+            table[k, read.index(name)] += weight
     return table, -1.0 if law.operator == "min" else 1.0
 
 
@@ -147,7 +147,7 @@ def _law(rows: Rows, features: FloatArray) -> tuple[FloatArray, NDArray[np.intp]
 
 def _values(rows: Rows, features: FloatArray) -> FloatArray:
     """What each piece of the rows' laws says, shape ``(m, r, pieces)``."""
-    found: FloatArray = (rows.tables * features[:, :, None]).sum(axis=3)
+    found: FloatArray = (rows.tables * features[:, :, None]).sum(axis=-1)
     return found
 
 
@@ -231,7 +231,7 @@ def _solved(
     x = scale * (right * inside[:, :, None]).sum(axis=1)
     # Impulses that the pieces leave open must not move anything.
     loose = np.where(kept[:, :, None], 0.0, right) * scale[:, None]
-    moved = np.abs((rows.gain[:, None] * loose[:, :, None]).sum(axis=3) * scale[:, None])
+    moved = np.abs((rows.gain[:, None] * loose[:, :, None]).sum(axis=-1) * scale[:, None])
     against = np.where(kept, 0.0, (left * (scale * value)[:, :, None]).sum(axis=1))
     ray = (left * against[:, None]).sum(axis=2)
     ray = np.where(kept, 0.0, (right * ray[:, None]).sum(axis=2))

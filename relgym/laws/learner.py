@@ -26,9 +26,9 @@ from relgym.laws.free import FreeLearner
 from relgym.laws.inertia import Inertia
 from relgym.laws.ledger import Ledger, doubtful
 from relgym.laws.pair import PairFit, fit_pair, outdated
-from relgym.laws.pieces import FEWEST
 from relgym.laws.points import Points
 from relgym.laws.records import FreeLaw, Kind, PairLaw, Share
+from relgym.laws.store import Stream
 from relgym.laws.touching import Cast, Contacts
 from relgym.laws.turning import PushStore
 from relgym.scene.objects import Target
@@ -81,7 +81,7 @@ class LawLearner:
         if self.book.turning:
             self._store = PushStore(schema, self.sources, seed=seed)
         self._drift = {name: Drift() for name in self.sources}
-        self._rng = np.random.default_rng([seed, 3])
+        self._rng = np.random.default_rng([seed, Stream.PAIRS])
         self._ledger = Ledger(self.sources)
         self._news = 0
         self._stored_wrong = 0
@@ -401,13 +401,13 @@ class LawLearner:
     def _found(self) -> PairFit | None:
         """The law of pairs that the contacts kept give, and how bodies share what it says; None if too few do."""
         book, store = self.book, self._store
+        if len(store) < 2:  # one contact fixes a weight, another one verifies it
+            return None
         if isinstance(store, PushStore):
-            if len(store) < FEWEST:
-                return None
             book.inertia = store.inertia(book.free, book.tolerance, rng=self._rng)
             return store.fit(book.free, book.inertia, book.tolerance, rng=self._rng)
         encounters = store.encounters(book)
-        if encounters is None or len(encounters) < FEWEST:
+        if encounters is None or len(encounters) < 2:
             return None
         found = fit_pair(encounters, rng=self._rng)
         if len(gone := outdated(encounters, found, rng=self._rng)):

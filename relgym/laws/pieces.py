@@ -29,10 +29,7 @@ from relgym.laws.records import Piece
 from relgym.numeric.stepwise import least_squares
 from relgym.scene.geometry.vectors import FloatArray
 
-__all__ = ["FEWEST", "AxisExamples", "find_pieces", "fitted"]
-
-FEWEST = 2
-"""Contacts that tell a law at least: one that fixes a weight and one that verifies it."""
+__all__ = ["AxisExamples", "find_pieces", "fitted"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +95,7 @@ def find_pieces(examples: AxisExamples, known: list[Piece], *, rng: np.random.Ge
     for piece in known:
         left &= ~examples.explains(piece)
     for _ in range(ALTERNATIVES):
-        if left.sum() < FEWEST:
+        if not left.any():
             break
         told = _search(examples.rows(left), examples, rng=rng)
         if told is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +12,15 @@ from numpy.typing import NDArray
 from relgym.config.constants import FIRST_ROOM
 from relgym.numeric.growing import grown
 
-__all__ = ["Store"]
+__all__ = ["Store", "Stream"]
+
+
+class Stream(enum.IntEnum):
+    """Who draws random numbers of its own from the same seed, whatever others draw."""
+
+    FREE = enum.auto()
+    KEPT = enum.auto()
+    PAIRS = enum.auto()
 
 
 class Store:
@@ -37,7 +46,7 @@ class Store:
         self._arrived = np.zeros(FIRST_ROOM, dtype=np.int64)
         self._size = 0
         self._counts: dict[int, int] | None = None  # worked out when it is needed
-        self._rng = np.random.default_rng([seed, 2])
+        self._rng = np.random.default_rng([seed, Stream.KEPT])
 
     @property
     def rows(self) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from relgym.laws.columns import Sources
 from relgym.laws.frames import Bearings
 from relgym.laws.points import Points, find_points
 from relgym.laws.records import Kind
-from relgym.scene.axes import Axes
+from relgym.scene.axes import WORLD, Axes
 from relgym.scene.contacts import velocity_columns
 from relgym.scene.geometry.areas import mean_squares
 from relgym.scene.geometry.manifolds import Manifolds
@@ -148,10 +148,11 @@ def _geometry(
     axes: Axes, types: list[ObjectType], sources: Mapping[str, Sources]
 ) -> tuple[Manifolds | None, FloatArray]:
     """What finds the points of contacts and what masses follow from, if something turns that isn't round."""
+    plane = axes.used[0], axes.used[1]
     if not any(s.turns for s in sources.values()):
-        return None, np.empty((3, 0))
+        return None, mean_squares([], plane)
     shapes = [t.shape for t in types if t.shape is not None]
-    return Manifolds(axes, shapes), mean_squares(shapes, (axes.used[0], axes.used[1]))
+    return Manifolds(axes, shapes), mean_squares(shapes, plane)
 
 
 def _spin_columns(layout: SceneLayout, sources: Mapping[str, Sources]) -> NDArray[np.intp]:
@@ -244,7 +245,7 @@ class Contacts:
         length = norm(between)
         angles = np.moveaxis(pose_a[..., 3:6], -1, 0)
         if self.cast.axes.planar:
-            angles = np.repeat(self.cast.axes.turn * angles[self.cast.axes.depth][None], 3, axis=0)
+            angles = np.repeat(self.cast.axes.turn * angles[self.cast.axes.depth][None], len(WORLD), axis=0)
         normals = np.empty(between.shape)
         for body in np.unique(a).tolist():
             part = a == body

@@ -27,9 +27,7 @@ from relgym.scene.axes import WORLD, Axes
 from relgym.scene.geometry.vectors import FloatArray, dot
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["LETTERS", "PushStore", "Yields", "eases", "precedented", "push", "rows_of", "shape_features"]
-
-LETTERS = axis_names(POINT, 2)
+__all__ = ["PushStore", "Yields", "eases", "precedented", "push", "rows_of", "shape_features"]
 
 ERRORS = 4.0
 """A velocity at a point is worked out from so many that are stored."""
@@ -176,9 +174,10 @@ def rows_of(
 def _tables(law: PairLaw, numbers: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
     """Weights and signs of all rows' laws; `numbers` has shape ``(2, m, c)``."""
     most = max(len(each.pieces) for laws in law.axes for each in laws)
+    letters = axis_names(law.frame, len(law.axes))
     tables, signs = [], []
     for axis, laws in enumerate(law.axes):
-        told = [table_of(each, axis, LETTERS, most) for each in laws]
+        told = [table_of(each, axis, letters, most) for each in laws]
         tables.append(np.stack([table for table, _ in told])[numbers[axis]])
         signs.append(np.array([sign for _, sign in told])[numbers[axis]])
     return np.concatenate(tables, axis=1), np.concatenate(signs, axis=1)
@@ -250,10 +249,13 @@ class PushStore:
         self._sizes = tuple(f"s{WORLD[axis]}" for axis in Axes.of(schema).used)
         self._turn = Axes.of(schema).turn
         columns = max((len(s.names) for s in sources.values()), default=0)
-        widths = {"kind": 1, "normal": 2}
+        d = len(self._sizes)
+        # A turning rate beside the velocity; area and mean square distance beside the sizes.
+        moving, shape = d + 1, 2 + d
+        widths = {"kind": 1, "normal": d}
         for side in "ab":
-            widths |= {f"object_{side}": 1, f"now_{side}": 3, f"after_{side}": 3, f"arm_{side}": 2}
-            widths |= {f"shape_{side}": 4, f"x_{side}": columns}
+            widths |= {f"object_{side}": 1, f"now_{side}": moving, f"after_{side}": moving, f"arm_{side}": d}
+            widths |= {f"shape_{side}": shape, f"x_{side}": columns}
         ends = np.cumsum(list(widths.values())).tolist()
         self._at = {name: slice(end - w, end) for (name, w), end in zip(widths.items(), ends, strict=True)}
         self._store = Store(ends[-1], MOST_ROWS, seed=seed)
@@ -330,13 +332,17 @@ class PushStore:
             pushes = self._pushes(free, kinds, side)
             names = [self.kinds[k]["ab".index(side)] for k in kinds.tolist()]
             moves = np.array([name in free for name in names], dtype=bool)
-            spins = np.array([n in free and len(free[n].components) == 3 for n in names], dtype=bool)
+            spins = np.array([n in free and self._spins(free[n]) for n in names], dtype=bool)
             spinning.append(pushes.of(np.flatnonzero(moves & spins)))
             sides.append(pushes)
             both = moves & both if side == "b" else moves
         gyrations = find_gyrations(_joined(spinning), tolerance, rng=rng)
         rows = np.flatnonzero(both)
         return Inertia(find_mass(sides[0].of(rows), sides[1].of(rows), tolerance), gyrations)
+
+    def _spins(self, law: FreeLaw) -> bool:
+        """Whether a free law says what becomes of the turning rate, too."""
+        return len(law.components) > len(self.sources[law.type].velocity)
 
     def _pushes(self, free: Mapping[str, FreeLaw], kinds: NDArray[np.intp], side: str) -> Pushes:
         change = self._column(f"after_{side}") - self._free(free, kinds, side)
