@@ -17,8 +17,7 @@ from relgym.classification.learning import Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.config.constants import CALL, NEARLY_ALL, SHORT
-from relgym.logic.search import UNIT
+from relgym.config.constants import CALL, NEARLY_ALL, SHORT, UNIT
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]

@@ -17,12 +17,11 @@ from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
-from relgym.config.constants import ANSWERS, SAME_DIGITS
+from relgym.config.constants import ANSWERS, SAME_DIGITS, UNIT
 from relgym.logic.clause import Definition
 from relgym.logic.csp import World, matches
 from relgym.logic.facts import Facts
 from relgym.logic.foil import learn
-from relgym.logic.search import UNIT
 from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["RoleClassifier", "RoleKind"]

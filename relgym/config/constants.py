@@ -69,6 +69,7 @@ __all__ = [
     "TOLD",
     "TYPICAL",
     "VERIFYING",
+    "UNIT",
     "WIDE",
 ]
 
@@ -265,6 +266,9 @@ CALL: Final = 25_000
 
 FIRST_ROOM: Final = 256
 """Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
+
+UNIT: Final = 12
+"""Cells that one unit of `ModelConfig.work_per_step` stands for."""
 
 CACHED: Final = 1 << 14
 """Numbers that are worked on at once where more would be, 128 kB: with what is made of them they fit a core's cache."""

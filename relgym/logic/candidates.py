@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import MOST_BYTES
+from relgym.config.logic import FoilConfig
 from relgym.logic.clause import ANY, Literal
 from relgym.logic.cuts import Cuts, best_cuts
 from relgym.logic.facts import Float, Int
 from relgym.logic.growing import Counts, Growing, Score, Weights
-from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import NumericStack, Tables
 from relgym.logic.templates import Template
 from relgym.logic.thresholds import simplest_between

@@ -8,6 +8,7 @@ intersects nothing.
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -19,9 +20,26 @@ from relgym.arguments import refusing_calls
 from relgym.config.constants import SAME_DIGITS
 from relgym.errors import ConfigError
 
-__all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal"]
+__all__ = ["ANY", "Clause", "Coverage", "Definition", "Literal", "Slot"]
 
-ANY: Final = -1
+
+class Slot(enum.IntEnum):
+    """What may stand in an argument's place where no variable's number does, in literals and their patterns.
+
+    Attributes
+    ----------
+    ANY
+        Universal, in a negated literal; in a pattern (`NEW`) a new variable, that is universal if it is negated.
+    OLD
+        In a pattern: the first existential variable that the clause has; the second is one less, and so on.
+    """
+
+    ANY = -1
+    NEW = ANY
+    OLD = -2
+
+
+ANY: Final = Slot.ANY
 """The universally quantified argument of a negated literal, printed ``*``."""
 
 _OPERATORS = (None, "<=", ">")

@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 
 from relgym.config.constants import ALTERNATIVES, CALL, ROUNDED, SAME_DIGITS, SHORT
+from relgym.config.logic import FoilConfig
 from relgym.logic.clause import Clause, Coverage, Definition
 from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Bool, Float
 from relgym.logic.growing import Growing, Score, Weights
 from relgym.logic.pruning import Problem, center_thresholds, prune
 from relgym.logic.search import Harvest, grow
-from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps
 

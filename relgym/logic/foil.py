@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 
 from relgym.arguments import array_of
 from relgym.config.constants import ROUNDED
+from relgym.config.logic import FoilConfig
 from relgym.errors import ConfigError
 from relgym.logic.clause import Definition
 from relgym.logic.cover import Cover
 from relgym.logic.facts import Facts, Float, Int
-from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps, resumable
 

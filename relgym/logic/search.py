@@ -5,31 +5,22 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config.constants import ALTERNATIVES, CALL, ROUNDED, SAME_DIGITS
+from relgym.config.logic import FoilConfig
 from relgym.logic.candidates import Block, blocks
 from relgym.logic.clause import Coverage
 from relgym.logic.description import DescriptionLength
 from relgym.logic.growing import Counts, Growing, Score, Weights, extend
-from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 from relgym.logic.thresholds import signs_differ
 from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["UNIT", "Harvest", "grow"]
-
-
-_PATIENCE: Final = 2
-"""A search ends after so many literals that told neither tuples nor bindings apart better; one that connects pays only
-with the next."""
-
-
-UNIT: Final = 12
-"""Cells that one unit of `ModelConfig.work_per_step` stands for."""
+__all__ = ["Harvest", "grow"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +77,8 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
             beam = [each for each in beam if _may_pay(each, tables.arity, length, whole)]
             values = (_worth(each, tables.arity, length, whole, score) for each in new)
             worth.append(max((*worth[-1:], *values), default=0.0))
-        if not beam or (len(worth) > _PATIENCE and worth[-1] <= worth[-1 - _PATIENCE]):
+        # Two literals in a row that tell nothing apart better end it; one that connects pays only with the next.
+        if not beam or (len(worth) > 2 and worth[-1] <= worth[-3]):
             break
     return Harvest(tuple(pool.values()), work)
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.logic.clause import ANY, Literal
+from relgym.logic.clause import ANY, Literal, Slot
 from relgym.logic.facts import Bool, Facts, Int, compare
-from relgym.logic.templates import FIRST, NEW, Template, templates
+from relgym.logic.templates import Template, templates
 from relgym.logic.thresholds import Bins, bin_values
 
 __all__ = ["Defined", "NumericStack", "Stack", "Tables"]
@@ -143,7 +143,7 @@ class Tables:
         slots: list[int] = []
         axes: list[bool] = []
         for arg in literal.args:
-            slots.append(arg if NEW <= arg < self.arity else FIRST - len(axes))
+            slots.append(arg if Slot.NEW <= arg < self.arity else Slot.OLD - len(axes))
             axes += [arg == ANY] if not 0 <= arg < self.arity else []
         values = self._array(Template(literal.relation, tuple(slots)))
         truth = values.astype(np.bool_) if literal.op is None else compare(values.astype(np.float64), literal)
@@ -155,7 +155,7 @@ class Tables:
         kept: dict[bytes, tuple[Template, NDArray[np.float32]]] = {}
         for template in templates:
             array = self._array(template)
-            new = [code == NEW for code in template.slots if not 0 <= code]
+            new = [code == Slot.NEW for code in template.slots if not 0 <= code]
             axes = tuple(axis for axis, is_new in enumerate(new) if is_new)
             count = array.sum(axis=axes, dtype=np.float32) if axes else array.astype(np.float32)
             key = bytes([template.fresh]) + count.tobytes()

@@ -6,25 +6,18 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Final
 
-from relgym.logic.clause import ANY, Literal
+from relgym.logic.clause import ANY, Literal, Slot
 from relgym.logic.facts import Facts
 
-__all__ = ["FIRST", "NEW", "Template", "templates"]
-
-NEW: Final = ANY
-"""Pattern code of a new variable; the same argument of the negated literal is universal."""
-
-FIRST: Final = NEW - 1
-"""Pattern code of the first existential variable; the second is one less, and so on."""
+__all__ = ["Template", "templates"]
 
 
 @dataclass(frozen=True, order=True)
 class Template:
     """A relation or function and a pattern for its arguments.
 
-    `slots` holds, per argument, the number of a target variable, `NEW`, or a code below `NEW` for an
+    `slots` holds, per argument, the number of a target variable, `Slot.NEW`, or `Slot.OLD` and below for an
     existential variable that is yet to be chosen.
     """
 
@@ -34,12 +27,12 @@ class Template:
     @cached_property
     def existentials(self) -> int:
         """How many existing existential variables the pattern takes."""
-        return sum(code < NEW for code in self.slots)
+        return sum(code < Slot.NEW for code in self.slots)
 
     @cached_property
     def fresh(self) -> int:
         """How many new variables the pattern introduces."""
-        return sum(code == NEW for code in self.slots)
+        return sum(code == Slot.NEW for code in self.slots)
 
     def literal(
         self,
@@ -52,10 +45,10 @@ class Template:
         """Return the literal for chosen existential variables and the number of the first new one."""
         args, unused = [], itertools.count(fresh)
         for code in self.slots:
-            if code == NEW:
+            if code == Slot.NEW:
                 args.append(ANY if negated else next(unused))
             else:
-                args.append(code if code >= 0 else variables[FIRST - code])
+                args.append(code if code >= 0 else variables[Slot.OLD - code])
         return Literal(self.name, tuple(args), negated, op, threshold)
 
 
@@ -78,7 +71,7 @@ def templates(facts: Facts, names: Sequence[str], arity: int, max_new: int) -> I
         stored = facts.arity(name) - relative
         for slots in _patterns(stored, 1 if relative else 0, arity, max_new):
             # a literal joins the clause by at least one argument; only r(B) alone may float
-            if relative or stored <= 1 or any(code != NEW for code in slots):
+            if relative or stored <= 1 or any(code != Slot.NEW for code in slots):
                 yield Template(name, (0, *slots) if relative else slots)
 
 
@@ -86,9 +79,9 @@ def templates(facts: Facts, names: Sequence[str], arity: int, max_new: int) -> I
 def _patterns(stored: int, first: int, arity: int, max_new: int) -> tuple[tuple[int, ...], ...]:
     """All ways to fill `stored` arguments without repeating one of the target variables from `first` on."""
     found = []
-    for slots in itertools.product([*range(first, arity), FIRST, NEW], repeat=stored):
+    for slots in itertools.product([*range(first, arity), Slot.OLD, Slot.NEW], repeat=stored):
         chosen = [code for code in slots if code >= 0]
-        if len(set(chosen)) == len(chosen) and slots.count(NEW) <= max_new:
+        if len(set(chosen)) == len(chosen) and slots.count(Slot.NEW) <= max_new:
             numbers = itertools.count()
-            found.append(tuple(FIRST - next(numbers) if code == FIRST else code for code in slots))
+            found.append(tuple(Slot.OLD - next(numbers) if code == Slot.OLD else code for code in slots))
     return tuple(found)

@@ -85,8 +85,10 @@ def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Fl
     lowest, highest, count = distinct[starts_at], distinct[ends], len(ends)
     good = np.bincount(place, positive[defined], count) > 0
     bad = np.bincount(place, ~positive[defined], count) > 0
-    kind = good + 2 * bad  # 1: positives only, 2: negatives only, 3: both have this value
-    starts = np.flatnonzero((kind[1:] != kind[:-1]) | (kind[1:] == 3)) + 1
+    same = (good[1:] == good[:-1]) & (bad[1:] == bad[:-1])
+    starts = (
+        np.flatnonzero(~same | (good & bad)[1:]) + 1
+    )  # a value that both classes have is a bin of its own
     if len(starts) >= _MAX_BINS:
         starts = starts[np.linspace(0, len(starts) - 1, _MAX_BINS - 1).round().astype(np.int64)]
     bins[defined] = np.searchsorted(starts, place, side="right")

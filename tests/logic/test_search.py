@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from logic_worlds import random_facts
 from numpy.typing import NDArray
 
+from relgym.config.logic import FoilConfig
 from relgym.logic.batch import matches
 from relgym.logic.candidates import blocks
 from relgym.logic.clause import Clause, Literal
@@ -16,7 +17,6 @@ from relgym.logic.description import DescriptionLength
 from relgym.logic.facts import Facts
 from relgym.logic.growing import Score, Weights
 from relgym.logic.search import grow
-from relgym.logic.settings import FoilConfig
 from relgym.logic.tables import Tables
 
 LENGTH = DescriptionLength(8, 8)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
+from relgym.config.constants import UNIT
 from relgym.html import html_table
-from relgym.logic.search import UNIT
 from relgym.model.learning.forgetting import forget
 from relgym.model.learning.stillness import recall
 from relgym.model.parts import Parts

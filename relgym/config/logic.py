@@ -1,4 +1,4 @@
-"""The free parameters of FOIL."""
+"""Parameters of FOIL (§3.4.1)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from relgym.arguments import refusing_fields
+from relgym.config.checks import at_least, one_of, unit
 from relgym.config.constants import ALTERNATIVES
 from relgym.errors import ConfigError
 
@@ -65,11 +66,7 @@ class FoilConfig:
     mdl: bool = True
 
     def __post_init__(self) -> None:
-        if self.choice not in ("gain", "negatives"):
-            raise ConfigError(f"choice: expected 'gain' or 'negatives', got {self.choice!r}.")
-        least = {"max_literals": 1, "max_clauses": 1, "max_new_variables": 0, "beam": 1, "lookahead": 0}
-        for name, bound in least.items():
-            if getattr(self, name) < bound:
-                raise ConfigError(f"{name}: expected at least {bound}, got {getattr(self, name)}.")
-        if not 0.0 <= self.min_precision <= 1.0:
-            raise ConfigError(f"min_precision: expected a share in [0, 1], got {self.min_precision}.")
+        one_of(self, choice=("gain", "negatives"))
+        at_least(self, 1, "max_literals", "max_clauses", "beam")
+        at_least(self, 0, "max_new_variables", "lookahead")
+        unit(self, "min_precision")
