@@ -66,6 +66,7 @@ __all__ = [
     "SMALL",
     "STDS",
     "SUMMABLE",
+    "SWEEPS",
     "TOLD",
     "TYPICAL",
     "VERIFYING",
@@ -177,6 +178,10 @@ DRAWS: Final = 96
 
 WIDE: Final = 40
 """Searches of more columns than this draw fewer and larger samples, and choose in a cheaper way."""
+
+SWEEPS: Final = 20
+"""Sweeps over the contacts of a scene, or trials of which pieces of their laws hold, before something else is tried;
+and how often that is done: a budget, of 400 sweeps."""
 
 NEARLY_ALL: Final = 0.9
 """Share of the examples that a function must explain where others may come between: what comes from nowhere, what is

@@ -9,20 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ROUNDINGS, TOLD
+from relgym.config.constants import ROUNDINGS, SWEEPS, TOLD
 from relgym.laws.frames import Bearings, axes_of, axis_names
 from relgym.laws.joints import Joint, Joints
 from relgym.laws.records import AxisLaw, PairLaw
 from relgym.laws.touching import Group
 from relgym.scene.geometry.vectors import FloatArray, dot
 
-__all__ = ["SWEEPS", "Composed", "Engaged", "compose", "respond", "within"]
-
-SWEEPS = 400
-"""Most sweeps over the contacts of a scene."""
-
-LEAP = 10
-"""After so many sweeps each, impulses that go on changing alike are extrapolated."""
+__all__ = ["Composed", "Engaged", "compose", "respond", "within"]
 
 
 class Composed(NamedTuple):
@@ -127,13 +121,13 @@ def compose(engaged: Engaged, group: Group, joints: Joints, now: FloatArray, fre
     eps = float(np.finfo(np.float64).eps)
     still = eps * np.maximum(1.0, ROUNDINGS * np.abs(free).max(axis=(0, 2)))
     before = np.empty(0)
-    for sweep in range(1, SWEEPS + 1):
+    for sweep in range(1, SWEEPS * SWEEPS + 1):
         step = settling.sweep()
         going = np.abs(step).max(axis=(0, 2)) > still[settling.active]
         settling.keep(going)
         if not len(settling.active):
             break
-        if sweep % LEAP == 0:
+        if sweep % SWEEPS == 0:
             settling.leap(before[:, going], step[:, going])
         before = step[:, going]
     return settling.result(settled=False)

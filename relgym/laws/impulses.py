@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, ROUNDED
+from relgym.config.constants import ALIKE, ROUNDED, ROUNDINGS, SWEEPS, TOLD
 from relgym.laws.records import ONE, AxisLaw
 from relgym.scene.geometry.vectors import FloatArray
 
@@ -24,21 +24,8 @@ __all__ = ["FEATURES", "Rows", "Solved", "solve", "table_of"]
 FEATURES = ("u", "v", "u_other", "v_other", "J_n", ONE)
 """What laws of a row read: its own axis' velocities, the other axis', the normal impulse, and 1."""
 
-TRIALS = 12
-"""Choices of pieces that are tried before sweeps go on."""
-
-SWEEPS, ROUNDS = 20, 10
-"""Sweeps between trials, and how often that is done."""
-
-SLACK = 4096.0 * float(np.finfo(np.float64).eps)
-"""A row obeys its law up to so many times the velocities of its island."""
-
-LOOSE = 1e-5
-"""Where no impulses satisfy all laws exactly, a row obeys its law up to so many times the velocities of its island.
-
-A body that lies flat touches in two points, at heights that differ by their overlaps: both can't stick while it turns
-by however little. Impulses against each other then grow from sweep to sweep, and engines stop somewhere.
-"""
+SLACK = TOLD * ROUNDINGS * float(np.finfo(np.float64).eps)
+"""A row obeys its law up to so many times the velocities of its island: what is less tells nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +64,8 @@ class Solved:
     impulse
         Of each row, shape ``(m, r)``.
     settled
-        Whether every row obeys its law (as far as that can be: `LOOSE`), and no other impulses with the same pieces
-        would give other velocities; shape ``(m,)``.
+        Whether every row obeys its law (as far as that can be), and no other impulses with the same pieces would give
+        other velocities; shape ``(m,)``.
     """
 
     impulse: FloatArray
@@ -106,16 +93,18 @@ def solve(rows: Rows) -> Solved:
     m, r = rows.free.shape
     impulse, settled = np.zeros((m, r)), np.zeros(m, dtype=bool)
     active = np.arange(m)
-    for round_ in range(ROUNDS):
+    for round_ in range(SWEEPS):
         part = rows.of(active)
         found, done, fit = _tried(part, impulse[active], stepwise=round_ % 2 == 1)
         impulse[active[done]] = found[done]
         settled[active[done]] = fit[done]
         active = active[~done]
-        if not len(active) or round_ == ROUNDS - 1:
+        if not len(active):
             break
         impulse[active] = _swept(rows.of(active), impulse[active])
-    settled[active] = _obeyed(rows.of(active), impulse[active], LOOSE)
+    # A body that lies flat touches in two points, at heights that differ by their overlaps: both can't stick while it
+    # turns by however little. Impulses against each other grow from sweep to sweep, and engines stop somewhere.
+    settled[active] = _obeyed(rows.of(active), impulse[active], ALIKE)
     return Solved(impulse, settled)
 
 
@@ -166,7 +155,7 @@ def _tried(
     m = len(start)
     x, done, fit = start.copy(), np.zeros(m, dtype=bool), np.zeros(m, dtype=bool)
     active = np.arange(m)
-    for _ in range(TRIALS):
+    for _ in range(SWEEPS):
         part = rows.of(active)
         features, sense = _features(part, x[active])
         _, choice = _law(part, features)
