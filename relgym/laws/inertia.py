@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, DIGITS, DRAWS, FEWEST, LEFT_OPEN, POWERS, SAME_DIGITS, TOLD
+from relgym.config.constants import ALIKE, DIGITS, DRAWS, FEWEST, LEFT_OPEN, LITTLE, POWERS, SAME_DIGITS, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -41,9 +41,6 @@ AREA: Final = "shape.area"
 
 SQUARE: Final = "shape.r2"
 """Name of the mean square distance of a body's points from its position."""
-
-ROUGHLY = 1e-4
-"""Relative error up to which contacts count as obeying a first estimate: then all of them together sharpen it."""
 
 By = Literal["", "type", "object"]
 
@@ -337,7 +334,7 @@ def _forms(
             [(y0 * other[1] - y1 * one[1]) / determinant, (one[0] * y1 - other[0] * y0) / determinant]
         )
         rough = np.median(weights, axis=1)
-        near = np.abs(pushes.torque - rough @ x) <= ROUGHLY * np.abs(pushes.torque)
+        near = np.abs(pushes.torque - rough @ x) <= LITTLE * np.abs(pushes.torque)
         if near.sum() > 2:
             rough = np.linalg.lstsq(x[:, near].T, pushes.torque[near], rcond=None)[0]
         yield ((a, float(rough[0])), (b, float(rough[1]))), 2.0 * (naming + constant)
@@ -378,7 +375,8 @@ def find_mass(a: Pushes, b: Pushes, tolerance: float) -> Mass | None:
                 for side, own in zip(sides, named, strict=True)
             ]
             left = np.abs(masses[0] * a.change + masses[1] * b.change).max(axis=0)
-            wrong = int((left > 4.0 * tolerance * np.maximum(*masses)).sum())
+            # Each change is the difference of two velocities.
+            wrong = int((left > 2.0 * tolerance * (masses[0] + masses[1])).sum())
             bits = sum(np.log2(max(2, len(shared))) + 2.0 for _ in factors) + EXCEPTION_BITS * wrong
             bits += constant * max(0, len(constants) - 1) + float(bool(by))
             if wrong <= LEFT_OPEN * n and (best is None or bits < best[0] - ALIKE):
@@ -446,5 +444,5 @@ def _weight(x: FloatArray, y: FloatArray) -> float:
     if not told.any():
         return float("nan")
     rough = float(np.median((x * y).sum(axis=0)[told] / size[told]))
-    near = told & (((y - rough * x) ** 2).sum(axis=0) <= ROUGHLY**2 * (y * y).sum(axis=0))
+    near = told & (((y - rough * x) ** 2).sum(axis=0) <= LITTLE**2 * (y * y).sum(axis=0))
     return float((x * y)[:, near].sum() / size[near].sum()) if near.any() else rough

@@ -29,9 +29,6 @@ from relgym.scene.schema import SceneSchema
 
 __all__ = ["PushStore", "Yields", "eases", "precedented", "push", "rows_of", "shape_features"]
 
-ERRORS = 4.0
-"""A velocity at a point is worked out from so many that are stored."""
-
 
 def shape_features(cast: Cast, pose: FloatArray, body: int) -> dict[str, FloatArray]:
     """What inertia may read of a body's size and shape in n scenes; `pose` has shape ``(n, K, 9)``."""
@@ -401,7 +398,7 @@ class PushStore:
             np.stack([a[part] for a in after]),
             (gains[1] * impulse[0])[part],
             kinds[part],
-            ERRORS * tolerance,
+            2.0 * tolerance,  # each has the errors of four: two velocities, two turning rates
         )
         found = self._stated(seen, {}, rng=rng)
         moving = {} if found.explained.all() else _running(seen, found.explained, self.kinds)
