@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, TOLD
+from relgym.config.constants import ALIKE, ALTERNATIVES, TOLD
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, shorter_apart
 from relgym.laws.frames import FRAMES, POINT, Bearings, axes_of, axis_names, turned
 from relgym.laws.kinds import KindsFit, fit_apart, fit_together
@@ -18,9 +18,6 @@ from relgym.numeric.changes import changed_at
 from relgym.scene.geometry.vectors import FloatArray, dot, norm
 
 __all__ = ["Encounters", "PairFit", "explained_by", "fit_pair", "outdated"]
-
-SPLIT = 2
-"""In so many of the best frames materials are told apart, should one law not be enough for all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +118,8 @@ def fit_pair(encounters: Encounters, *, rng: np.random.Generator, frames: Sequen
         if draft is not None:
             drafts.append(draft)
     best: PairFit | None = None
-    for draft in sorted(drafts, key=_bits)[:SPLIT]:
+    # Should one law not be enough for all, materials are told apart in the best frames.
+    for draft in sorted(drafts, key=_bits)[:ALTERNATIVES]:
         found = draft.split(np.inf if best is None else best.law.bits, rng=rng)
         if best is None or found.law.bits < best.law.bits - ALIKE:
             best = found
@@ -179,7 +177,7 @@ def _limit(drafts: Sequence[_Draft]) -> float:
     known = sorted(drafts, key=_bits)
     if known and known[0].whole:
         return known[0].bits
-    return known[SPLIT - 1].bits if len(known) >= SPLIT else np.inf
+    return known[ALTERNATIVES - 1].bits if len(known) >= ALTERNATIVES else np.inf
 
 
 @dataclass(frozen=True, slots=True)
