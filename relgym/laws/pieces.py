@@ -182,10 +182,8 @@ def _picks(n: int, p: int, *, rng: np.random.Generator) -> NDArray[np.intp]:
     if p == 1:
         return np.arange(n)[:, None] if n <= DRAWS else rng.choice(n, (DRAWS, 1))
     first = rng.integers(0, n, 2 * DRAWS)
-    # Half of the partners are close in time: neighbours tend to obey the same piece.
-    step = np.where(
-        np.arange(2 * DRAWS) % 2 == 0, rng.integers(1, n, 2 * DRAWS), rng.integers(1, 4, 2 * DRAWS)
-    )
+    # Half of the partners are next in time: neighbours tend to obey the same piece.
+    step = np.where(np.arange(2 * DRAWS) % 2 == 0, rng.integers(1, n, 2 * DRAWS), 1)
     return np.stack([first, (first + step) % n], axis=1)
 
 
