@@ -16,8 +16,6 @@ from relgym.laws.records import ZERO, Operator, Piece, combined
 
 __all__ = ["AxisFit", "fit_axis", "refitted"]
 
-MOST_COMBINED = 3
-
 
 @dataclass(frozen=True, slots=True)
 class AxisFit:
@@ -49,11 +47,16 @@ def fit_axis(examples: AxisExamples, *, rng: np.random.Generator) -> AxisFit:
     pieces = [*known, *find_pieces(examples, known, rng=rng)]
     values = [examples.values(piece) for piece in pieces]
     scored = []
-    for operator, chosen in _choices(len(pieces)):
-        after = combined(operator, [values[k] for k in chosen])
-        explained = np.abs(examples.y - after) <= examples.tolerance
-        scored.append((_score(examples, [pieces[k] for k in chosen], explained), operator, chosen))
-    least = min(score for score, _, _ in scored)
+    least = np.inf
+    # More pieces are combined as long as that says it in fewer bits.
+    for size in range(1, len(pieces) + 1):
+        for operator, chosen in _choices(len(pieces), size):
+            after = combined(operator, [values[k] for k in chosen])
+            explained = np.abs(examples.y - after) <= examples.tolerance
+            scored.append((_score(examples, [pieces[k] for k in chosen], explained), operator, chosen))
+        before, least = least, min(score for score, _, _ in scored)
+        if least == before:
+            break
     best = [(operator, chosen) for score, operator, chosen in scored if score <= least + ALIKE]
     fits = [_refit(examples, operator, tuple(pieces[k] for k in chosen)) for operator, chosen in best]
     first = fits[0]
@@ -72,12 +75,12 @@ def refitted(examples: AxisExamples, operator: Operator, pieces: tuple[Piece, ..
     return _refit(examples, operator, pieces)
 
 
-def _choices(count: int) -> Iterator[tuple[Operator, tuple[int, ...]]]:
-    for size in range(1, MOST_COMBINED + 1):
-        for chosen in combinations(range(count), size):
-            yield "max", chosen
-            if size > 1:
-                yield "min", chosen
+def _choices(count: int, size: int) -> Iterator[tuple[Operator, tuple[int, ...]]]:
+    """Every way to combine so many of the pieces."""
+    for chosen in combinations(range(count), size):
+        yield "max", chosen
+        if size > 1:
+            yield "min", chosen
 
 
 def _score(examples: AxisExamples, pieces: list[Piece], explained: NDArray[np.bool_]) -> float:
