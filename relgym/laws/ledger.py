@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from relgym.config.constants import LEFT_OPEN
+from relgym.config.constants import EVIDENCE, LEFT_OPEN
 
-__all__ = ["SETTLED", "Ledger", "doubtful"]
+__all__ = ["Ledger", "doubtful"]
 
 
 def doubtful(wrong: int, count: int, share: float) -> bool:
@@ -22,10 +22,6 @@ def doubtful(wrong: int, count: int, share: float) -> bool:
     right = count - wrong
     anyhow = math.lgamma(wrong + 1) + math.lgamma(right + 1) - math.lgamma(count + 2)
     return anyhow > wrong * math.log(share) + right * math.log1p(-share)
-
-
-SETTLED = 500
-"""Transitions, with hardly a surprise, after which laws count as settled."""
 
 
 @dataclass(slots=True)
@@ -82,9 +78,13 @@ class Ledger:
         return self._tallies[type_name].unlearned
 
     def settled(self, type_name: str) -> bool:
-        """Whether the laws have long been as they are, and wrong no more often since than laws may be (`LEFT_OPEN`)."""
+        """Whether the laws have long been as they are, and wrong no more often since than laws may be (`LEFT_OPEN`).
+
+        So long that laws which are wrong more often would have shown it, but for a chance that evidence excludes.
+        """
         tally = self._tallies[type_name]
-        return tally.since >= SETTLED and tally.wrong <= LEFT_OPEN * tally.since
+        told = -tally.since * math.log2(1.0 - LEFT_OPEN)
+        return told >= EVIDENCE and tally.wrong <= LEFT_OPEN * tally.since
 
     def to_json(self) -> list[list[str | int]]:
         """Plain data that `restore` reads back."""
