@@ -13,15 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALTERNATIVES
+from relgym.config.constants import ALTERNATIVES, ROUNDS
 from relgym.laws.records import Bound, Piece, Region
 from relgym.numeric.tree import DecisionTree, learn_tree
 
 __all__ = ["find_laws", "find_regions"]
-
-PARTS = (2, 4, 8)
-"""Numbers of stretches into which examples are cut along an axis. Narrower regions are found once others are explained:
-stretches are cut anew from what is left."""
 
 _Laws = Sequence[tuple[Piece, ...]]
 
@@ -83,7 +79,10 @@ def _most_telling(
 
 
 def _stretches(place: NDArray[np.float64], rows: NDArray[np.intp], fewest: int) -> Iterator[NDArray[np.intp]]:
-    for parts in PARTS:
+    # Halves, quarters, eighths. Narrower regions are found once others are explained: what is left is cut anew.
+    parts = 1
+    for _ in range(ROUNDS):
+        parts *= 2
         for column in range(place.shape[1]):
             order = rows[np.argsort(place[rows, column], kind="stable")]
             yield from (stretch for stretch in np.array_split(order, parts) if len(stretch) >= fewest)
