@@ -10,7 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import finite
-from relgym.config.constants import FEWEST, LEFT_OPEN, NEARLY_ALL, ROUNDED, ROUNDINGS, STDS, TYPICAL
+from relgym.config.clustering import ClusteringConfig
+from relgym.config.constants import (
+    DRAWS,
+    FEWEST,
+    LEFT_OPEN,
+    MOST_ROWS,
+    NEARLY_ALL,
+    OFTEN,
+    ROUNDED,
+    ROUNDINGS,
+    STDS,
+    TYPICAL,
+)
 from relgym.laws.columns import Sources
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS, function_bits, piece_bits, shorter_apart
 from relgym.laws.records import ONE, FreeLaw, Piece, Region
@@ -24,13 +36,8 @@ from relgym.scheduling.renewal import due
 
 __all__ = ["FreeLearner", "free_motion"]
 
-KEPT = 600
-"""Examples of free motion that are kept."""
-
-MOST_TERMS = 6
-
-_FEW = 3
-"""Constants whose bits no longer form could save."""
+MOST_TERMS = ClusteringConfig().max_terms
+"""A law of free motion has as many terms at most as a mode."""
 
 
 def free_motion(law: FreeLaw, names: tuple[str, ...], x: FloatArray) -> FloatArray:
@@ -62,7 +69,7 @@ class FreeLearner:
         self.sources = sources
         self.law: FreeLaw | None = None
         self._d = len(sources.moving)
-        self.store = Store(len(sources.names) + self._d, KEPT, seed=seed)
+        self.store = Store(len(sources.names) + self._d, MOST_ROWS, seed=seed)
         self._rng = np.random.default_rng([seed, Stream.FREE])
         self._news = 0
 
@@ -107,9 +114,10 @@ class FreeLearner:
         if finite(x) and (place := self.store.draw(0)) is not None:
             self.store.put(place, np.concatenate([x, after]), cell=0)
 
-    def _patience(self) -> int:
+    def _patience(self) -> float:
         """How much news doesn't call for another search: ever more while there is no law, or one that fails."""
-        return self.seen // 4 if self.law is None else self.law.unexplained // 4
+        known = self.seen - self._news if self.law is None else self.law.unexplained
+        return (OFTEN - 1.0) * known
 
     def fit(self, tolerance: float) -> bool:
         """Learn the law anew from the examples kept; whether it changed."""
@@ -156,7 +164,7 @@ class FreeLearner:
         for count in dict.fromkeys((self._d, len(self.sources.velocity))):
             law = self._law(components[:count], (), x, y[:, :count], tolerance)
             # What few constants say of a region, many may say of the bodies that happened to be there.
-            if self.sources.where and law.bits > EXCEPTION_BITS * _FEW:
+            if self.sources.where and law.bits > EXCEPTION_BITS * FEWEST:
                 law = min(law, self._regional(x, y[:, :count], tolerance) or law, key=_law_bits)
             if law.unexplained <= (1.0 - NEARLY_ALL) * len(rows):
                 return law
@@ -233,12 +241,12 @@ class FreeLearner:
             _simplest(LinearFit((0,), (1.0,), steady, 0.0), names, columns, y, tolerance),
         ]
         least = min(_bits(piece, names, columns, y, tolerance) for piece in forms)
-        if least > EXCEPTION_BITS * _FEW:
+        if least > EXCEPTION_BITS * FEWEST:  # what founds a law, no fewer exceptions
             fit = forward_stepwise(columns, y, sigma=sigma, max_terms=MOST_TERMS)
             if mixed and np.abs(y - fit.predict(columns)).max() > tolerance:
                 terms = min(len(order), MOST_TERMS)
                 found = consensus(
-                    columns, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 3, draws=256,
+                    columns, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 2, draws=DRAWS,
                     rng=self._rng,
                 )  # fmt: skip
                 fit = fit if found is None else found.fit

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import FIRST, LEFT_OPEN, ROUNDINGS, SELDOM, STDS, TOLD
+from relgym.config.constants import FIRST, LEFT_OPEN, OFTEN, ROUNDINGS, SELDOM, STDS, TOLD
 from relgym.laws.book import LawBook, Motion
 from relgym.laws.columns import Sources, vector_types
 from relgym.laws.description import EXCEPTION_BITS
@@ -378,7 +378,7 @@ class LawLearner:
     def _hear(self, news: int) -> bool:
         """Seek the law of pairs again, if enough contacts are news; whether it changed."""
         self._news += news
-        if self._news and self._news <= self._stored_wrong // 4:
+        if self._news and self._news <= (OFTEN - 1.0) * self._stored_wrong:
             return False
         return self._derive()
 
