@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -21,9 +20,6 @@ from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps
 
 __all__ = ["Cover"]
-
-_RELAID: Final = 0.7
-"""Share of the tuples below which a search gets tables of its own."""
 
 
 class Cover:
@@ -117,12 +113,10 @@ class Cover:
         return [self._harvests[key].clauses[place] for place in sorted(keys, key=keys.__getitem__)]
 
     def _harvest(self, alive: Bool, config: FoilConfig) -> Steps[Harvest]:
-        """Search among the tuples left. Where many are gone it is cheaper to lay out the others anew."""
+        """Search among the tuples left. Where some are gone it is cheaper to lay out the others anew."""
         tables, weights = self._tables, self._problem.weights
-        if alive.mean() < _RELAID:
+        if not alive.all():
             tables, weights = tables.restricted(alive), weights[alive]
-        else:
-            weights = np.where(alive, weights, 0.0)
         classes = Weights(weights[: tables.split], weights[tables.split :], self._swapped)
         return grow.steps(tables, classes, config, self._length)
 
