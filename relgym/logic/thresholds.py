@@ -8,18 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALL_DIGITS, LITTLE, ROUNDED
+from relgym.config.constants import ALL_DIGITS, FEW_VALUES, LITTLE, ROUNDED
 from relgym.logic.facts import Float, Int
 
 __all__ = ["Bins", "bin_values", "merit", "rounding", "signs_differ", "simplest_between"]
-
-_MAX_BINS: Final = 128
-"""Finest histogram; where classes alternate more often, cuts are taken at every m-th boundary."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +85,8 @@ def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Fl
     starts = (
         np.flatnonzero(~same | (good & bad)[1:]) + 1
     )  # a value that both classes have is a bin of its own
-    if len(starts) >= _MAX_BINS:
-        starts = starts[np.linspace(0, len(starts) - 1, _MAX_BINS - 1).round().astype(np.int64)]
+    if len(starts) >= FEW_VALUES:  # where classes alternate so often, cuts are taken at every m-th boundary
+        starts = starts[np.linspace(0, len(starts) - 1, FEW_VALUES - 1).round().astype(np.int64)]
     bins[defined] = np.searchsorted(starts, place, side="right")
     first = np.concatenate([[0], starts])
     last = np.concatenate([starts, [count]]) - 1

@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relgym.config.constants import FEW_VALUES
 from relgym.logic.thresholds import bin_values, merit, simplest_between
 
 
@@ -50,7 +51,7 @@ def test_the_number_of_bins_is_bounded() -> None:
     values = np.arange(2000.0)
     alternating = np.concatenate([values[::2], values[1::2]])[np.newaxis]
     bins = bin_values(alternating, split=1000)
-    assert bins.count == 128
+    assert bins.count == FEW_VALUES
     order = np.argsort(alternating[0])
     assert (np.diff(bins.index[0][order]) >= 0).all()
 
