@@ -69,8 +69,8 @@ __all__ = [
     "SWEEPS",
     "TOLD",
     "TYPICAL",
-    "VERIFYING",
     "UNIT",
+    "VERIFYING",
     "WIDE",
 ]
 
