@@ -594,18 +594,18 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-            if not _makes_claims(speaker):
-                usual = self._usual(able, speaker)
-                if not trusted.squares[usual][0]:  # never heard here
-                    trusted = family = self._whole()
-                    speaker, known = usual, [trusted]
-                elif trusted.lead(speaker, usual) < EVIDENCE:
-                    speaker = usual
+            usual, wider = self._usual(known[0], able, speaker)
+            heard = trusted.squares[usual][0]
+            if usual != speaker and trusted.lead(speaker, usual if heard else PERSISTENCE) < EVIDENCE:
+                speaker = usual
+                if not heard:
+                    trusted = family = wider
+                    known = [wider]
         elif not self._cells or (OWN in able and self._vouches(family, bits, key)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
-            speaker, known = self._usual(able, PERSISTENCE), [trusted]
+            speaker, known = self._anywhere(able, PERSISTENCE), [trusted]
         latest = next((c for c in (cell, winner) if c is not None and speaker in c.records), None)
         said = _Record() if latest is None else latest.records[speaker]
         prior, bits = _mean(family, speaker), bits if speaker == OWN else 0.0
@@ -631,11 +631,17 @@ class Calibration:
         told = self._assess(nearer, able)
         return told._replace(probability=min(told.probability, 0.5))
 
-    def _usual(self, able: tuple[int, ...], speaker: int) -> int:
-        """Who codes best in all cells together, if by enough; else who would speak."""
-        whole = self._whole()
-        best = whole.best([k for k in able if k not in (OWN, LATEST)])
-        return best if whole.lead(best, speaker) >= EVIDENCE else speaker
+    def _usual(self, winner: _Cell, able: tuple[int, ...], speaker: int) -> tuple[int, _Cell]:
+        """Who codes better than who would speak, by enough, in all cells of a winner, or in all; and in which."""
+        best = winner.preferred(able, (self.probability, self.allowed))
+        if best != speaker and winner.lead(best, speaker) >= EVIDENCE:
+            return best, winner
+        return (speaker if _makes_claims(speaker) else self._anywhere(able, speaker)), self._whole()
+
+    def _anywhere(self, able: tuple[int, ...], speaker: int) -> int:
+        """Who needs no winner and codes better than who would speak, by enough, in all cells together."""
+        best = self._whole().best([k for k in able if k not in (OWN, LATEST)])
+        return best if self._whole().lead(best, speaker) >= EVIDENCE else speaker
 
     def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
         """Whether modes, or laws, were right often enough in what they said of changes for a new one to speak.
