@@ -20,6 +20,7 @@ from relgym.config.constants import (
     ALTERNATIVES,
     DRAWS,
     EXTRAPOLATED,
+    FEWEST,
     ROUNDED,
     ROUNDS,
     SEARCHED_ROWS,
@@ -182,8 +183,10 @@ def _picks(n: int, p: int, *, rng: np.random.Generator) -> NDArray[np.intp]:
     if p == 1:
         return np.arange(n)[:, None] if n <= DRAWS else rng.choice(n, (DRAWS, 1))
     first = rng.integers(0, n, 2 * DRAWS)
-    # Half of the partners are next in time: neighbours tend to obey the same piece.
-    step = np.where(np.arange(2 * DRAWS) % 2 == 0, rng.integers(1, n, 2 * DRAWS), 1)
+    # Half of the partners are close in time: neighbours tend to obey the same piece, and those next to one another
+    # differ by too little to tell it where there is noise.
+    near = rng.integers(1, FEWEST, 2 * DRAWS)
+    step = np.where(np.arange(2 * DRAWS) % 2 == 0, rng.integers(1, n, 2 * DRAWS), near)
     return np.stack([first, (first + step) % n], axis=1)
 
 

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config import ClassificationConfig
+from relgym.config.classification import ClassificationConfig
 from relgym.config.constants import CACHED, CALL, ROUNDED
 from relgym.errors import ConfigError
 from relgym.scheduling.work import Steps, resumable

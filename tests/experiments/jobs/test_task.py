@@ -50,6 +50,9 @@ def test_only_plain_data() -> None:
 def test_the_version_covers_what_is_imported_and_nothing_else() -> None:
     behind = modules_behind("relgym.numeric.tree")
     assert behind == (
+        "relgym.arguments",
+        "relgym.config.checks",
+        "relgym.config.classification",
         "relgym.config.constants",
         "relgym.errors",
         "relgym.numeric.tree",
