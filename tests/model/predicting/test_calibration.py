@@ -182,6 +182,78 @@ def test_who_codes_best_speaks_once_it_leads_by_ten_bits() -> None:
     assert spoke == sorted(spoke)  # it takes over once
 
 
+def test_where_a_cell_tells_little_who_codes_best_in_all_of_them_speaks() -> None:
+    """Regressions are twice as close as persistence: 20 trials of it are 20 bits, 8 of them 8."""
+    known, little, enough = Calibration(0.9), Key(2, 0, 0), Key(3, 0, 0)
+    for _ in range(FEW):
+        seen(known, values(now=0.0), 0.0, key=little, claimed=False)  # so persistence speaks there
+        seen(known, values(now=0.0), 0.0, key=enough, claimed=False)
+    said = values(regression=1.0, now=0.0)
+    for _ in range(8):
+        seen(known, said, 2.0, key=little, claimed=False)
+    assert known.assess(little, said).speaker == PERSISTENCE  # by 8 bits there, and everywhere
+    for _ in range(20):
+        seen(known, said, 2.0, key=KEY._replace(outcome=1), claimed=False)
+    assert known.assess(little, said).speaker == REGRESSION
+    for _ in range(20):
+        seen(known, values(regression=2.0, now=0.0), 0.0, key=enough, claimed=False)
+    assert known.assess(enough, said).speaker == PERSISTENCE  # which was never off there
+
+
+def test_where_a_lead_tells_little_all_that_its_winner_said_does() -> None:
+    known, rare = Calibration(0.5), KEY._replace(lead=5)
+    rng = np.random.default_rng(4)
+    for k in range(200):
+        came = float(rng.random() < 0.3)  # a flag that nobody foresees is most closely told by its mean
+        seen(known, values(own=0.0, regression=0.3), came, key=KEY if k % 5 else rare)
+    assert known.assess(KEY, values(own=0.0, regression=0.3)).speaker == REGRESSION
+    told = known.assess(rare, values(own=0.0, regression=0.3))
+    assert told.speaker == REGRESSION
+    assert not known.claims(rare, told)
+
+
+def test_modes_vouch_for_a_new_one_by_what_they_said_of_changes() -> None:
+    known, new = Calibration(0.9), KEY._replace(winner=2)
+    for _ in range(200):
+        seen(known, values(own=1.0, now=1.0), 1.0)  # nothing changes, and one mode says so
+    assert known.assess(new, values(own=2.0, now=1.0)).speaker == PERSISTENCE
+    for _ in range(20):
+        seen(known, values(own=2.0, now=1.0), 2.0)
+    assert known.assess(new, values(own=2.0, now=1.0)).speaker == OWN
+
+
+def test_where_much_is_unexplained_a_new_mode_is_to_prove_itself() -> None:
+    known, new, said = right(50), KEY._replace(winner=2), values(own=1.0)
+    assert known.assess(new, said).speaker == OWN
+    known.accounted = False
+    assert known.assess(new, said).speaker == PERSISTENCE
+    assert known.assess(KEY, said).speaker == OWN  # which was right itself
+    for _ in range(4):
+        seen(known, said, 1.0, key=new)
+    assert known.assess(new, said).speaker == OWN
+
+
+def test_what_held_last_is_no_law_and_speaks_only_where_something_changes() -> None:
+    known, said = Calibration(0.9), list(values(own=0.0, now=1.0))
+    said[LATEST] = 1.0
+    for _ in range(40):
+        seen(known, tuple(said), 1.0)
+    assert known.assess(KEY, tuple(said)).speaker == PERSISTENCE  # as right, and simpler
+    known = Calibration(0.9)
+    for _ in range(FEW):
+        seen(known, values(own=0.0, now=1.0), 0.4)  # persistence is worse, and nobody knew what held last
+    for _ in range(4):
+        seen(known, tuple(said), 1.0)
+    assert known.assess(KEY, tuple(said)).speaker != LATEST
+    known, said[PERSISTENCE] = Calibration(0.9), 0.5
+    for _ in range(40):
+        seen(known, tuple(said), 1.0)
+    told, record = known.assess(KEY, tuple(said)), known._cells[KEY].records[LATEST]
+    prior = known._cells[KEY._replace(lead=OF_FAMILY)].records[LATEST].mean(0.5)
+    assert told.speaker == LATEST
+    assert told.probability == record.mean(prior) < record.share(prior)
+
+
 def test_who_never_leads_by_ten_bits_never_speaks() -> None:
     known = Calibration(0.9)
     rng = np.random.default_rng(1)
