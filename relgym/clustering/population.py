@@ -132,7 +132,7 @@ class Population:
         """Number of examples no mode explains."""
         if not len(self.log):
             return self.known_noise
-        return int((self.labels == NOISE).sum()) + self.log.forgotten[NOISE]
+        return int(np.count_nonzero(self.labels == NOISE)) + self.log.forgotten[NOISE]
 
     @property
     def seen(self) -> int:

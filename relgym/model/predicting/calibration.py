@@ -416,6 +416,10 @@ class _Cell:
         most = sys.float_info.max
         return 0.5 * trials * math.log2(min(max(ratio, 1.0 / most), most))
 
+    def undecided(self, expert: int, other: int) -> bool:
+        """Whether an expert doesn't lead another one by enough; one that was never heard, if not even persistence."""
+        return self.lead(expert, other if self.squares[other][0] else PERSISTENCE) < EVIDENCE
+
     def preferred(self, able: Collection[int], claims: tuple[float, float]) -> int:
         """Who of those who have a value speaks.
 
@@ -594,11 +598,11 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-            usual, wider = self._usual(known[0], able, speaker)
-            heard = trusted.squares[usual][0]
-            if usual != speaker and trusted.lead(speaker, usual if heard else PERSISTENCE) < EVIDENCE:
+            rivals = [k for k in able if k != speaker and trusted.undecided(speaker, k)]
+            usual, wider = self._usual(known[0], able, speaker) if rivals else (speaker, trusted)
+            if usual in rivals:
                 speaker = usual
-                if not heard:
+                if not trusted.squares[usual][0]:  # never heard here
                     trusted = family = wider
                     known = [wider]
         elif not self._cells or (OWN in able and self._vouches(family, bits, key)):
@@ -636,7 +640,9 @@ class Calibration:
         best = winner.preferred(able, (self.probability, self.allowed))
         if best != speaker and winner.lead(best, speaker) >= EVIDENCE:
             return best, winner
-        return (speaker if _makes_claims(speaker) else self._anywhere(able, speaker)), self._whole()
+        if _makes_claims(speaker):
+            return speaker, winner
+        return self._anywhere(able, speaker), self._whole()
 
     def _anywhere(self, able: tuple[int, ...], speaker: int) -> int:
         """Who needs no winner and codes better than who would speak, by enough, in all cells together."""
