@@ -598,9 +598,9 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-            rivals = [k for k in able if k != speaker and trusted.undecided(speaker, k)]
-            usual, wider = self._usual(known[0], able, speaker) if rivals else (speaker, trusted)
-            if usual in rivals:
+            others = [k for k in able if k != speaker and trusted.undecided(speaker, k)]
+            usual, wider = self._usual(known[0], able, speaker) if others else (speaker, trusted)
+            if usual in others:
                 speaker = usual
                 if not trusted.squares[usual][0]:  # never heard here
                     trusted = family = wider
