@@ -179,26 +179,26 @@ class ModeClusterer:
             What may be spent on searches; those that take more are gone on with (`go_on`). Default: all they take.
         """
         budget = Budget() if budget is None else budget
-        before = set(self.clusters)
-        example = self._append(table, row, y, budget)
+        before, installed = set(self.clusters), self.population.installed
+        example, moved = self._append(table, row, y, budget), False
         errors = self.population.errors_of(table, example)
         if (mode := self.population.choose(table, example, errors)) != NOISE:
             self.labels[example] = mode
-            self._grow(table, mode)
+            moved = self._grow(table, mode)
         elif min(errors.values(), default=np.inf) > self.scale.tail:  # a known mode's tail seeds nothing
             self.search.discover(table, example, budget)
         reassigned = self.seen >= RECENT and due(self.seen, FIRST, OFTEN) and self._review(table)
         self.due |= self._timely(table)
         self.approximate_now(table, budget)
+        moved |= self.population.installed > installed
         after = set(self.clusters)
         fitting = [i for i, e in errors.items() if e <= self.scale.tolerance]
-        if reassigned or after != set(errors):
-            ids, fits = self.fits(table, np.array([example]))
-            fitting = [i for i, ok in zip(ids, fits[0], strict=True) if ok]
+        if reassigned or moved or after != set(errors):
+            ids, known = self.fits(table, np.array([example]))
+            fitting = [i for i, ok in zip(ids, known[0], strict=True) if ok]
         created, removed = tuple(sorted(after - before)), tuple(sorted(before - after))
-        return ClusterReport(
-            int(self.labels[example]), tuple(sorted(fitting)), created, removed, reassigned=reassigned
-        )
+        label, fits = int(self.labels[example]), tuple(sorted(fitting))
+        return ClusterReport(label, fits, created, removed, reassigned=reassigned, moved=moved)
 
     @property
     def searching(self) -> bool:
@@ -210,11 +210,11 @@ class ModeClusterer:
 
         To `begin`, one is begun where all examples are news and the next one would begin it.
         """
-        before = set(self.clusters)
+        before, installed = set(self.clusters), self.population.installed
         if begin:
             self.search.search_all(table, budget)
         self.search.pursue(table, budget)
-        return before != set(self.clusters)
+        return before != set(self.clusters) or self.population.installed > installed
 
     def _append(self, table: ExampleTable, row: int, y: float, budget: Budget) -> int:
         example = self.population.log.append(row, y)
@@ -228,14 +228,16 @@ class ModeClusterer:
             self._rescale(table, budget, estimating=estimating)
         return example
 
-    def _grow(self, table: ExampleTable, mode: int) -> None:
-        """§3.2.4, M-step: refit a mode whose examples have multiplied since its last fit."""
+    def _grow(self, table: ExampleTable, mode: int) -> bool:
+        """§3.2.4, M-step: refit a mode whose examples have multiplied since its last fit; whether it is another now."""
         cluster = self.clusters[mode]
         cluster.unfitted += 1
-        if cluster.unfitted >= (self.config.refit_growth - 1.0) * cluster.fitted:
-            members = np.flatnonzero(self.labels == mode)
-            self.clusters[mode] = refit(cluster, table, self.rows[members], self.y[members], self.scale)
-            self._split_rest(table, mode, members)
+        if cluster.unfitted < (self.config.refit_growth - 1.0) * cluster.fitted:
+            return False
+        members = np.flatnonzero(self.labels == mode)
+        self.clusters[mode] = refit(cluster, table, self.rows[members], self.y[members], self.scale)
+        self._split_rest(table, mode, members)
+        return not self.clusters[mode].mode.same_function(cluster.mode)
 
     def _split_rest(self, table: ExampleTable, number: int, members: NDArray[np.intp]) -> None:
         """Give a mode's examples on which none of its terms acts a mode of their own, if they are enough.

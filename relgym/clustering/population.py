@@ -35,6 +35,8 @@ class ClusterReport:
         Ids of modes that came and went.
     reassigned
         Whether older examples were assigned anew.
+    moved
+        Whether a mode's function is another one since it was fitted to more, or it took the place of others.
     """
 
     mode: int
@@ -42,11 +44,12 @@ class ClusterReport:
     created: tuple[int, ...] = ()
     removed: tuple[int, ...] = ()
     reassigned: bool = False
+    moved: bool = False
 
     @property
     def changed(self) -> bool:
-        """Whether the set of modes is another than before, or its examples are."""
-        return bool(self.created or self.removed or self.reassigned)
+        """Whether the set of modes is another than before, or its examples or functions are."""
+        return bool(self.created or self.removed or self.reassigned or self.moved)
 
 
 class Population:
@@ -73,6 +76,8 @@ class Population:
         The examples, and their modes by id.
     next_id
         Id of the next new mode.
+    installed
+        How often a mode was put in the place of others, or of none.
     known_noise
         Examples that no mode explained, of a model that was loaded without its examples.
     """
@@ -84,6 +89,7 @@ class Population:
         self.scale = Scale(float(np.finfo(np.float64).eps), config.inlier_stds, config.tail_stds)
         self.log = AssignmentLog()
         self.next_id = 1
+        self.installed = 0
         self.known_noise = 0
         self.approximate = False
         self.chancy = False
@@ -273,13 +279,15 @@ class Population:
         )
 
     def install(self, table: ExampleTable, cluster: Cluster, absorbed: tuple[int, ...]) -> int:
-        """Put a mode in the place of those it absorbed; its id."""
+        """Put a mode in the place of those it absorbed; its id: of one with the same function, as which it is known."""
         known = self.log.forgotten, self.log.passed
         inherited = [sum(counted.pop(i, 0) for i in absorbed) for counted in known]
+        same = [i for i in absorbed if self.clusters[i].mode.same_function(cluster.mode)]
         for i in absorbed:
             self.remove(i)
-        new = self.next_id
-        self.next_id += 1
+        new = same[0] if same else self.next_id
+        self.next_id = max(self.next_id, new + 1)
+        self.installed += 1
         self.clusters[new] = replace(cluster, mode=replace(cluster.mode, id=new))
         for counted, more in zip(known, inherited, strict=True):
             counted[new] += more

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from streams import BALL, Stream
+from streams import BALL, Stream, mode_of
 
 from relgym.clustering.clusterer import ClusterReport
 from relgym.clustering.columns import SlotSignature
+from relgym.clustering.em import Cluster
 from relgym.clustering.mode import NOISE
 from relgym.config import ClusteringConfig
 from relgym.scene.objects import ObjectType
@@ -121,6 +122,20 @@ def test_coefficients_are_exact(rng: np.random.Generator) -> None:
 
 
 # ---------------------------------------------------------------------- noise
+def test_a_function_that_is_another_one_once_it_is_fitted_to_more_is_reported(
+    rng: np.random.Generator,
+) -> None:
+    # On rows where w = 0 both hold; fitted to these alone the term is needless, and is dropped.
+    stream, found = Stream(), mode_of(("v", 1.0), ("w", 7.0), constant=-1.0)
+    stream.clusterer.population.clusters[1] = Cluster(found, fitted=10)
+    stream.clusterer.population.next_id = 2
+    speeds = rng.uniform(1.0, 9.0, 30)
+    reports = stream.feed([(v, 0.0) for v in speeds], speeds - 1.0)
+    assert stream.formulas == ["v' = v - 1"]
+    assert [k for k, report in enumerate(reports) if report.changed] == [9]
+    assert not any(report.created or report.removed for report in reports)
+
+
 def test_what_obeys_nothing_stays_noise(rng: np.random.Generator) -> None:
     stream = Stream()
     stream.feed(states(rng, 120), rng.normal(size=120))

@@ -160,6 +160,16 @@ def test_a_mode_takes_over_those_that_it_absorbs_forgotten_ones_included() -> No
     assert population.noise_examples == 1
 
 
+def test_a_mode_that_absorbs_one_with_its_own_function_is_known_as_that_one() -> None:
+    rows = [(3.0, 0.0)] * 4 + [(0.0, 0.0)] * 4
+    population, table = made(rows, [3.0] * 4 + [0.0] * 4, PERSIST, STILL, labels=[1] * 4 + [2] * 4)
+    population.log.forgotten.update({1: 10})
+    assert population.install(table, Cluster(PERSIST), (1, 2)) == 1
+    assert population.labels.tolist() == [1] * 8
+    assert population.log.forgotten[1] == 10
+    assert (population.next_id, population.installed) == (3, 1)
+
+
 def test_a_mode_that_is_removed_leaves_its_examples_to_the_noise() -> None:
     population, _ = made([(1.0, 0.0)] * 3, [1.0, 1.0, 2.0], PERSIST, DOUBLE, labels=[1, 1, 2])
     population.log.forgotten.update({1: 5, 2: 7})
