@@ -136,13 +136,11 @@ class _Candidates:
     ) -> None:
         self._tables = tables
         self._length = length if config.mdl else None
-        self._blocks = [
-            (growing, block)
-            for growing in beam
-            for block in blocks(tables, growing, weights, score, config)
-            if block.templates
+        every = [
+            (growing, block) for growing in beam for block in blocks(tables, growing, weights, score, config)
         ]
-        self.groups = len(self._blocks)
+        self._blocks = [(growing, block) for growing, block in every if block.templates]
+        self.groups = len(every)
         sizes = [len(block.templates) for _, block in self._blocks]
         self._ends = np.cumsum(sizes, dtype=np.int64)
         self.size = int(self._ends[-1]) if self._blocks else 0

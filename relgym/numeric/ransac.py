@@ -16,6 +16,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum, auto
+from itertools import combinations
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +80,7 @@ def draw_samples(
     apart: NDArray[np.integer] | None = None,
     anchors: NDArray[np.intp] | None = None,
 ) -> Steps[NDArray[np.intp]]:
-    """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``.
+    """Row numbers of `draws` samples of `size` distinct rows, shape ``(draws, size)``; of few rows every sample once.
 
     The first row of each sample comes from `anchors` (default: any row). A third of the samples takes the
     others from anywhere, a third from the first row's stratum, a third from the rows nearest to it in time:
@@ -86,6 +88,9 @@ def draw_samples(
     few rows for a sample, those of the most similar states follow, if `apart` says how far states are apart, shape
     ``(n, n)``: among many objects hardly two rows are in the same one.
     """
+    every = _every_sample(n, size, draws, anchors)
+    if every is not None:
+        return every
     first = rng.choice(anchors if anchors is not None else np.arange(n), size=draws)
     style = np.resize(list(_Style), draws)
     found = np.empty((draws, min(size, n)), dtype=np.intp)
@@ -108,6 +113,21 @@ def draw_samples(
         yield 2 * len(base) * n
     yield CALL
     return found
+
+
+def _every_sample(n: int, size: int, draws: int, anchors: NDArray[np.intp] | None) -> NDArray[np.intp] | None:
+    """Each sample of distinct rows, behind each anchor, once; None if there are more than `draws`, or none."""
+    starts = [()] if anchors is None else [(int(row),) for row in anchors]
+    rest = size - len(starts[0])
+    if not 0 < len(starts) * comb(n - len(starts[0]), rest) <= draws:
+        return None
+    others = ([row for row in range(n) if row not in start] for start in starts)
+    samples = [
+        (*start, *more)
+        for start, left in zip(starts, others, strict=True)
+        for more in combinations(left, rest)
+    ]
+    return np.array(samples, dtype=np.intp)
 
 
 def extrapolated(y: NDArray[np.float64], sigma: float, *, misfit: bool) -> float:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from relgym.numeric import ransac
 from relgym.numeric.ransac import (
@@ -159,6 +162,19 @@ def test_the_order_of_rows_decides_nothing_when_all_obey(seed: int, order: list[
     assert found.fit.columns == (1, 3)
 
 
+@pytest.mark.parametrize("anchors", [None, np.array([1, 4])])
+def test_of_few_rows_every_sample_is_drawn_once(anchors: NDArray[np.intp] | None) -> None:
+    def drawn(draws: int) -> NDArray[np.intp]:
+        return draw_samples(6, 3, draws, rng=np.random.default_rng(0), anchors=anchors)
+
+    found = drawn(20)  # of 6 rows there are 20 samples of 3, and 10 behind each of two rows
+    assert len({(row[0] if anchors is not None else 0, frozenset(row)) for row in found.tolist()}) == 20
+    assert all(len(set(row)) == 3 for row in found.tolist())
+    if anchors is not None:
+        assert found[:, 0].tolist() == [1] * 10 + [4] * 10
+    assert len(drawn(19)) == 19
+
+
 # ---------------------------------------------------------------------- in pieces
 @settings(max_examples=50)
 @given(
@@ -171,6 +187,7 @@ def test_the_order_of_rows_decides_nothing_when_all_obey(seed: int, order: list[
 def test_samples_drawn_in_pieces_are_those_drawn_whole(
     n: int, size: int, draws: int, told: set[str], seed: int
 ) -> None:
+    assume(not 0 < comb(n - 1, size - 1) <= draws)  # else each sample is drawn once
     given_ = np.random.default_rng(seed)
     strata = given_.integers(4, size=n)
     arguments = {
