@@ -20,7 +20,7 @@ MOST = {
     "hypotheses": (0, 0),
     "laws": (0, 0),
     "logic": (0, 0),
-    "model": (11, 2),
+    "model": (10, 2),
     "numeric": (0, 5),
     "scheduling": (0, 0),
 }

@@ -30,6 +30,10 @@ class OnlineRidge:
     weights
         One row for each response, the intercept first, shape ``(responses, d + 1)``; of a response that came later
         than some rows, as if it had been 0 in those.
+    left
+        Mean square that the latest solution leaves of each response in rows like those that it comes from, shape
+        ``(responses,)``: generalised cross-validation, what is left in the rows themselves over the square of the share
+        of them that no weight takes up.
     mean, spread
         Where the columns lie, shape ``(d,)``, and the inverse of the sums of squares about that, with the penalty, in
         single precision, shape ``(d, d)``: what `leverage` is worked out from. Both are those of the latest solution.
@@ -40,7 +44,7 @@ class OnlineRidge:
 
     References
     ----------
-    Hoerl and Kennard (1970), Ridge regression.
+    Hoerl and Kennard (1970), Ridge regression; Golub, Heath and Wahba (1979), Generalized cross-validation.
 
     Examples
     --------
@@ -59,6 +63,8 @@ class OnlineRidge:
         self._half = (np.zeros((0, 0), dtype=np.float32), np.zeros((0, 0)))  # see `_halved`
         self._gram = np.zeros((columns + 1, columns + 1))
         self._moments = np.zeros((0, columns + 1))
+        self._squares = np.zeros(0)
+        self.left = np.zeros(0)
         self._due = due
         self._solved = 0  # rows that the weights come from, if they were solved here
 
@@ -78,6 +84,7 @@ class OnlineRidge:
             return
         self._gram += row[:, None] * row
         self._moments += y[:, None] * row
+        self._squares += y * y
         self.rows += 1
         if self.rows >= self._due:
             self.solve()
@@ -87,6 +94,8 @@ class OnlineRidge:
         if missing > 0:
             self._moments = np.pad(self._moments, ((0, missing), (0, 0)))
             self.weights = np.pad(self.weights, ((0, missing), (0, 0)))
+            self._squares = np.pad(self._squares, (0, missing))
+            self.left = np.pad(self.left, (0, missing), constant_values=np.inf)
 
     def solve(self) -> None:
         """Work out the weights from the rows so far, unless that was done."""
@@ -120,6 +129,20 @@ class OnlineRidge:
             self.spread = np.triu(spread) + np.triu(spread, 1).T
             level -= (solved * mean).sum(axis=1)
             self.weights = np.concatenate([level[:, None], solved], axis=1)
+            taken = 1.0 + np.count_nonzero(alive) - float(inverse.diagonal()[alive].sum()) / n
+            self.left = self._remains() / max(1.0 - taken / n, 1.0 / n) ** 2
+
+    def _remains(self) -> NDArray[np.float64]:
+        """Mean squares that the weights leave in the rows that they come from, shape ``(responses,)``."""
+        said = np.einsum("rj,ij->ri", self.weights, self._gram)
+        left = self._squares + ((said - 2.0 * self._moments) * self.weights).sum(axis=1)
+        remains: NDArray[np.float64] = np.maximum(left, 0.0) / max(self.rows, 1)
+        return remains
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """Mean square of each response, shape ``(responses,)``."""
+        return self._squares / max(self.rows, 1)
 
     def predict(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Responses of rows ``(n, d)``, shape ``(n, responses)``; of a row alone the same bits as among others."""
@@ -152,7 +175,8 @@ class OnlineRidge:
     # ------------------------------------------------------------------ saving
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The sums, which further rows are added to, and the weights."""
-        return {"gram": self._gram, "moments": self._moments, "weights": self.weights}
+        sums = {"gram": self._gram, "moments": self._moments, "squares": self._squares}
+        return {**sums, "weights": self.weights}
 
     @classmethod
     def restored(cls, rows: int, due: int, arrays: Mapping[str, NDArray[Any]]) -> OnlineRidge:
@@ -160,9 +184,11 @@ class OnlineRidge:
         weights = arrays["weights"]
         found = cls(weights.shape[1] - 1)
         found.rows, found._due, found.weights = rows, due, weights.copy()
-        found._moments = np.zeros_like(weights)
+        found._moments, found._squares = np.zeros_like(weights), np.zeros(len(weights))
+        found.left = np.full(len(weights), np.inf)
         if "gram" in arrays:
             found._gram, found._moments = arrays["gram"].copy(), arrays["moments"].copy()
+            found._squares = arrays["squares"].copy()
         return found
 
     @property

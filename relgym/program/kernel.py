@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from relgym.program.records import LEAST_RATE, SAYS, WIDER
+from relgym.program.records import LEAST_RATE, SAYS, VALUED, WIDER
 from relgym.program.tape import (
     ANGLES,
     ANSWERS,
@@ -1730,7 +1730,11 @@ def settled(s, a, k, value, outcome, mode, margin, able):
     trust = s.code[a + 25]
     winner = -mode if s.code[trust + 4] else mode
     kind = np.int64(PREDICTED if mode else outcome)
-    lead = s.far[k] if mode and s.code[trust + 5] else np.int64(0)
+    lead = np.int64(0)
+    if not mode:
+        lead = able & VALUED  # the winner's bit
+    elif s.code[trust + 5]:
+        lead = s.far[k]
     if lead == 0:
         lead = np.int64(lead_of(margin))
     number = ((winner * 16 + lead + 2) * 8 + kind) * 16 + able

@@ -32,10 +32,12 @@ __all__ = [
     "NO_RUNNER_UP",
     "OF_ALL",
     "OF_FAMILY",
+    "OF_REGRESSION",
     "OF_WINNER",
     "RATES",
     "SAYS",
     "TOUCHING",
+    "VALUED",
     "WIDER",
     "Answer",
     "AxisRule",
@@ -101,8 +103,13 @@ FREE, TOUCHING = 1, 2
 NO_RUNNER_UP = 7
 """Bin of leads where there is nobody to lead."""
 
-OF_WINNER, OF_FAMILY, OF_ALL = -1, -2, -3
-"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there are."""
+VALUED = 1
+"""Bin of leads where nobody is said to have won, since what it reads is in doubt or outside experience, but who would
+have given a value."""
+
+OF_WINNER, OF_FAMILY, OF_ALL, OF_REGRESSION = -1, -2, -3, -4
+"""Bins of leads that stand for all of a winner's, for those of all modes or all laws, and for all there were before the
+model was another one; and for what is known of the regression from all that it was fitted to."""
 
 FRAMES = ("contact", "point", "turned", "centres", "own", "world")
 """Frames of contact laws (`relgym.laws.frames`)."""

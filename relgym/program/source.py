@@ -835,6 +835,8 @@ def settled(number, said, outcome, mode, margin, x, odds):
         lead = 7 if margin == math.inf else min(max(math.frexp(margin)[1] + 2, 1), 6)
     if distant and mode and far >= 2.0:  # of an approximation, further than most of what it was made of
         lead = 13 if far == math.inf else min(6 + math.frexp(far)[1], 13)
+    if not mode and able & 1:  # who would have given a value isn't said to have won
+        lead = 1
     kind = PREDICTED if mode else outcome
     known = beliefs.get((kind, winner, lead, able)) or beliefs.get((kind, winner, -1, able))
     known = known or beliefs[kind, (winner > 0) - (winner < 0), -2, able]

@@ -28,6 +28,33 @@ def test_it_is_ridge_regression_of_standardised_columns() -> None:
     np.testing.assert_allclose(ridge.predict(x), z @ expected + y.mean(axis=0), atol=1e-9)
 
 
+def test_what_is_left_is_generalised_cross_validation() -> None:
+    x, y = rows(40)
+    ridge = OnlineRidge(3)
+    for one, response in zip(x, y, strict=True):
+        ridge.add(one, response)
+    ridge.solve()
+    z = (x - x.mean(axis=0)) / x.std(axis=0)
+    hat = 1.0 / 40 + z @ np.linalg.solve(z.T @ z + np.eye(3), z.T)
+    remains = np.square(y - hat @ y).mean(axis=0)
+    np.testing.assert_allclose(ridge.left, remains / (1.0 - np.trace(hat) / 40) ** 2, rtol=1e-6)
+    # Each row predicted from the others leaves as much: of a law nearly nothing, of noise more than there is of it.
+    others = np.square((y - hat @ y) / (1.0 - np.diag(hat))[:, None]).mean(axis=0)
+    np.testing.assert_allclose(ridge.left, others, rtol=0.1)
+    np.testing.assert_allclose(ridge.size, np.square(y).mean(axis=0))
+    assert ridge.left[1] > y[:, 1].var()
+
+
+def test_what_is_left_of_a_response_that_is_new_is_not_known() -> None:
+    x, y = rows(50)
+    ridge = OnlineRidge(3, due=40)
+    for one, response in zip(x, y, strict=True):
+        ridge.add(one, response[:1])
+    ridge.add(x[0], y[0])
+    assert np.isfinite(ridge.left[0])
+    assert ridge.left[1] == np.inf
+
+
 def test_weights_are_solved_anew_as_rows_become_more() -> None:
     x, y = rows(400)
     ridge = OnlineRidge(3)

@@ -780,6 +780,12 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
                 _rows(arrays, name, "float64", shape)
                 _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
                 names.add(name)
+            name = f"regression{k}.squares{number}"
+            if name in arrays:  # which earlier files don't say
+                _rows(arrays, name, "float64", (len(weights),))
+                fits = np.isfinite(arrays[name]).all() and (arrays[name] >= 0.0).all()
+                _require(fits, f"history: {name}", "expected sums of squares")
+                names.add(name)
         name = f"regression{k}.left"
         if name in arrays:  # which earlier files don't say
             _rows(arrays, name, "float64", (len(KINDS) * (len(RATES) + 1), len(regression.targets)))

@@ -134,7 +134,7 @@ def _take_up(
     mine.start_over(table)
     mine.hindsight = mine.hindsight.united(theirs.hindsight)
     mine.calibration = mine.calibration.united(theirs.calibration)
-    mine.calibration.accounted = mine.accounted_for
+    mine.calibration.reliable = mine.reliable
 
 
 def _exemplars(

@@ -207,8 +207,9 @@ def finish(parts: Parts) -> int:
         if not parts.governs(target):
             work += parts.models[target].refresh(None)
             parts.models[target].reconsider(parts.tables[target.type], budget)
-    for regression in parts.regressions.values():
+    for type_name, regression in parts.regressions.items():
         regression.settle()
+        _tell_regressed(parts, type_name)
     return work + budget.spent // UNIT
 
 
@@ -246,20 +247,29 @@ def _learn_object(
     row = table.add(situation.signature, x, situation.keys[0], bodies)
     example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
-    rough = False
+    asked = False
     for target, model in parts.by_type[type_name]:
         column = layout.column(index, target.property)
         y = float(following[column])
-        rough = rough or model.rough
+        asked = asked or model.rough
         changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
         if target.property in weights:
             report = model.learn_one(
                 table, row, y, situation.signature, example, budget, weights[target.property]
             )
             reports[name, target.property] = report
-    if rough:
-        parts.regressions[type_name].learn_one(situation.signature, x, changes)
+    if asked and parts.regressions[type_name].learn_one(situation.signature, x, changes):
+        _tell_regressed(parts, type_name)
+        budget.spend(parts.regressions[type_name].solving_cells)
     return moved
+
+
+def _tell_regressed(parts: Parts, type_name: str) -> None:
+    """Let a type's targets know how good regression is, since its weights are new."""
+    for target, model in parts.by_type[type_name]:
+        known = parts.regressions[type_name].record(target.property)
+        if known is not None:
+            model.calibration.regressed(*known)
 
 
 def _refresh(parts: Parts, budget: Budget) -> int:

@@ -18,7 +18,8 @@ law that changed is doubted at once, and a mode whose conditions were found is b
 believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
 known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
 Where it had none yet, all cells together tell whether it speaks. A new mode speaks at once if others were right in what
-they said of changes, and laws explain what is seen; else it is to prove itself first.
+they said of changes, laws explain what is seen, and it is told from all others without an error; else it is to prove
+itself first.
 
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
@@ -48,7 +49,7 @@ from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
 from relgym.config.constants import COVERED, EVIDENCE, MEMORY, NEARLY_ALL, SUMMABLE
-from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_WINNER
+from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_REGRESSION, OF_WINNER
 
 __all__ = [
     "EXPERTS",
@@ -133,7 +134,7 @@ class Assessment(NamedTuple):
 
 @lru_cache
 def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
-    """The cell of a prediction; most margins come again and again. `far`: see `far_bin`."""
+    """The cell of a prediction; most margins come again and again. `far`: see `far_bin`, or `VALUED`."""
     if far:
         return Key(outcome, winner, far)
     if not margin > 0.0:
@@ -163,7 +164,7 @@ def keys_of(
     margins: NDArray[np.float64],
     far: NDArray[np.int64] | None = None,
 ) -> Iterator[tuple[Key, NDArray[np.intp]]]:
-    """The cells of n predictions, and which of them lie in each; `far`: see `far_bins`."""
+    """The cells of n predictions, and which of them lie in each; `far`: see `far_bins`, or `VALUED`."""
     leads = lead_bins(margins)
     if far is not None:
         leads = np.where(far > 0, far, leads)
@@ -339,13 +340,17 @@ class _Cell:
         for expert in {OWN, self.speaker, *_VALUES}:
             self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker, spoke))
         base = errors[PERSISTENCE] ** 2
-        for sums, error in zip(self.squares, errors, strict=True):
+        for expert, (sums, error) in enumerate(zip(self.squares, errors, strict=True)):
             if error == error:
                 if sums[0] >= MEMORY:
                     sums[:] = [0.5 * s for s in sums]
+                # Of who is fitted the latest of n trials counts for two more, and those before for less: (i / n)^2.
+                more = min(2.0, sums[0] / times) if expert in _FITTED else 0.0
+                kept = 1.0 - more * times / sums[0] if more else 1.0
+                late = (1.0 + more) * times
                 sums[0] += times
-                sums[1] += times * error * error
-                sums[2] += times * base
+                sums[1] = kept * sums[1] + late * error * error
+                sums[2] = kept * sums[2] + late * base
         if errors[self.speaker] == 0.0 and self.squares[self.speaker][1] == 0.0:
             return  # nobody is better than who was never off
         best = self.best([k for k, error in enumerate(errors) if error == error])
@@ -473,7 +478,7 @@ class Calibration:
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
-        self._accounted = True
+        self._reliable: frozenset[int] | None = None
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
@@ -494,17 +499,20 @@ class Calibration:
             self._kinds.clear()
 
     @property
-    def accounted(self) -> bool:
-        """Whether laws explain what is seen; only then do modes that were right vouch for a new one.
+    def reliable(self) -> frozenset[int] | None:
+        """Modes that are told from all others without an error in what is remembered, where laws explain what is seen.
 
-        Where more is unexplained, what was found may be part of what nothing explains, and is to prove itself first.
+        None: nobody said, and it may be any mode.
+
+        Only for these modes that were right vouch. Where more is unexplained, what was found may be part of what
+        nothing explains, and where conditions err it isn't known when a mode holds: both are to prove themselves.
         """
-        return self._accounted
+        return self._reliable
 
-    @accounted.setter
-    def accounted(self, holds: bool) -> None:
-        if holds != self._accounted:
-            self._accounted = holds
+    @reliable.setter
+    def reliable(self, modes: frozenset[int] | None) -> None:
+        if modes != self._reliable:
+            self._reliable = modes
             self._changed()
 
     @property
@@ -605,7 +613,7 @@ class Calibration:
                 if not trusted.squares[usual][0]:  # never heard here
                     trusted = family = wider
                     known = [wider]
-        elif not self._cells or (OWN in able and self._vouches(family, bits, key)):
+        elif not self.trials or (OWN in able and self._vouches(family, bits, key)):
             speaker = next(k for k in _BY_DEFAULT if k in able)
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
@@ -654,15 +662,18 @@ class Calibration:
 
         Of a flag that seldom changes nearly all that they say is right, and of its changes next to nothing.
         """
-        if key.winner > 0 and not self.accounted:
+        if key.winner > 0 and self.reliable is not None and key.winner not in self.reliable:
             return False
         return _Record().share(_mean(family, OWN), bits) > self.probability
 
     def _whole(self) -> _Cell:
         """What all cells know together."""
         if self._united is None:
-            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _WHOLE]
+            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _beside(OF_ALL)]
             self._united = _Cell.united(cells, self.experts)
+            if (known := self._cells.get(_beside(OF_REGRESSION))) is not None:
+                for expert in (REGRESSION, PERSISTENCE):
+                    self._united.squares[expert] = max(known.squares[expert], self._united.squares[expert])
         return self._united
 
     def claims(self, key: Key, told: Assessment) -> bool:
@@ -932,6 +943,21 @@ class Calibration:
             cell._sure = None
         self._changed()
 
+    def regressed(self, trials: float, squares: float, persistence: float) -> None:
+        """Take in what regression leaves of rows like those it was fitted to: nobody may have looked back at most.
+
+        Parameters
+        ----------
+        trials
+            How many rows that were.
+        squares, persistence
+            What it leaves of as many others, and what saying that nothing changes does.
+        """
+        cell = self._cells.setdefault(_beside(OF_REGRESSION), _Cell.new(PERSISTENCE, self.experts))
+        cell.squares[REGRESSION] = [trials, squares, persistence]
+        cell.squares[PERSISTENCE] = [trials, persistence, persistence]
+        self._changed(cells=False)
+
     def speakers(self) -> dict[int, float]:
         """Trials of the cells in which each expert gives the value, by place of the expert."""
         found: dict[int, float] = {}
@@ -942,9 +968,12 @@ class Calibration:
         return found
 
     def doubts(self, outcome: int) -> bool:
-        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
+        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead.
+
+        Or nobody could tell so far: nothing won, or what it reads was wrong.
+        """
         if not self.share(outcome) >= 1.0 - self.allowed:
-            return _family(Key(outcome, 1, 0)) in self._cells
+            return self.trials > 0
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def failing(self, key: Key) -> bool:
@@ -962,7 +991,7 @@ class Calibration:
         whole = self._whole()
         for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
             whole.drop(expert)
-        self._cells, self._vouched = {_WHOLE: whole} if self._cells else {}, 0.0
+        self._cells, self._vouched = {_beside(OF_ALL): whole} if self._cells else {}, 0.0
         self._changed()
 
     def share(self, outcome: int) -> float:
@@ -1100,8 +1129,9 @@ def _winner(key: Key) -> Key:
     return Key(key.outcome, key.winner, OF_WINNER)
 
 
-_WHOLE: Final = Key(0, 0, OF_ALL)
-"""What was known before the model was another one."""
+def _beside(lead: int) -> Key:
+    """The cell of no kind of predictions: see `OF_ALL` and `OF_REGRESSION`."""
+    return Key(0, 0, lead)
 
 
 def _levels(key: Key) -> tuple[Key, Key, Key]:

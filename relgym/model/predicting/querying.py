@@ -36,6 +36,7 @@ from relgym.model.predicting.prediction import (
     ScenePrediction,
 )
 from relgym.model.target.property_model import PropertyModel, Verdict
+from relgym.program.records import VALUED
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
@@ -157,6 +158,7 @@ def settled(
         asks = mode != 0 and not lawful and model.tells_how_far
         away = parts.distance(percept, index, target.property) if asks else None
         far = 0 if away is None else far_bin(float(away[0]))
+    far = VALUED if not mode and math.isfinite(one.value) else far
     key = key_of(_PREDICTED if mode else OUTCOMES.index(one.outcome), -mode if lawful else mode, margin, far)
     word = model.own_word(key) if values is None and math.isfinite(one.value) else None
     record: Audit | LateAudit
@@ -245,7 +247,7 @@ def _experts_one(
         return tuple(found)
     latest = model.latest_values(percept, index, following[None])
     found[LATEST] = math.nan if latest is None else float(latest[0])
-    changes = parts.regressed(percept, index, target.property) if model.rough else None
+    changes = parts.regressed(percept, index, target.property) if model.asks_regressions else None
     if changes is not None:
         found[REGRESSION] = present + float(changes[0])
     if model.candidates:
@@ -281,7 +283,7 @@ def _experts(
     latest = None if parts.governs(target) else model.latest_values(percept, index, following)
     if latest is not None:
         found[:, LATEST] = np.where(np.isfinite(latest), latest, np.nan)
-    if model.rough and not parts.governs(target):
+    if model.asks_regressions and not parts.governs(target):
         changes = parts.regressed(percept, index, target.property)
         if changes is not None:
             told = present + changes
@@ -371,7 +373,8 @@ def _settled_many(
     outcomes = np.where(verdict.modes != 0, np.int8(_PREDICTED), verdict.outcomes)
     asks = model.tells_how_far and not parts.governs(target)
     away = parts.distance(percept, index, target.property) if asks else None
-    far = None if away is None else np.where(verdict.modes != 0, far_bins(away), 0)
+    valued = np.where(np.isfinite(verdict.values), VALUED, 0)
+    far = np.where(verdict.modes != 0, 0 if away is None else far_bins(away), valued)
     for key, part in keys_of(outcomes, winners, verdict.margins, far):
         for rows, told in model.assess_many(key, said[part]):
             some = part[rows]

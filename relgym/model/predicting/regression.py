@@ -94,13 +94,16 @@ class Regression:
 
     def learn_one(
         self, signature: SlotSignature, row: NDArray[np.float64], changes: Mapping[str, float]
-    ) -> None:
-        """Take in one example: a row of the signature's columns, and what each target changed by."""
+    ) -> bool:
+        """Take in one example: a row of the signature's columns, and what each target changed by.
+
+        Returns whether that changed the weights.
+        """
         if not self.names:
             self.names = _names(signature)
         places = self._columns(signature)
         if places is None or not 0 < len(places) <= self._most:
-            return
+            return False
         self.targets += [name for name in changes if name not in self.targets]
         self.seen += 1
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
@@ -113,12 +116,32 @@ class Regression:
             self._say[:, 0, -missing:] = 1.0  # all of a word counts
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
+            before = self._ridges[0].weights
             self._compare(x, y)
             self._add(x, y)
-            return
+            return self._ridges[0].weights is not before
         self._waiting.append((x, y))
         if len(self._waiting) == FIRST:
             self._begin()
+        return bool(self._ridges)
+
+    def record(self, target: str) -> tuple[float, float, float] | None:
+        """Rows learned, squares of a target's changes that would be left of as many others, and those of the changes.
+
+        Of the regression that leaves least, by generalised cross-validation (`OnlineRidge.left`). None: it isn't known.
+        """
+        if not self._ridges or target not in self.targets:
+            return None
+        k, first = self.targets.index(target), self._ridges[0]
+        left = min(float(ridge.left[k]) for ridge in self._ridges)
+        if not math.isfinite(left):
+            return None
+        return float(first.rows), first.rows * left, first.rows * float(first.size[k])
+
+    @property
+    def solving_cells(self) -> int:
+        """What solving for weights takes, in cells: of d^3 numbers in a core's cache each costs a quarter of others."""
+        return sum(ridge.columns * (ridge.columns // 2) ** 2 for ridge in self._ridges)
 
     def settle(self) -> None:
         """Solve for all rows that there are; meanwhile weights lag by a tenth of them."""
@@ -300,7 +323,7 @@ class Regression:
         found: dict[str, NDArray[Any]] = {"left": self._left.reshape(-1, len(self.targets))}
         for k, ridge in enumerate(self._ridges):
             arrays = ridge.to_arrays()
-            found |= {f"gram{k}": arrays["gram"], f"moments{k}": arrays["moments"]}
+            found |= {f"{name}{k}": arrays[name] for name in ("gram", "moments", "squares")}
         return found
 
     def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -315,6 +338,9 @@ class Regression:
             parts: dict[str, NDArray[Any]] = {"weights": np.array(weights, dtype=np.float64)}
             if f"gram{k}" in arrays:
                 parts |= {"gram": arrays[f"gram{k}"], "moments": arrays[f"moments{k}"]}
+                # Files of earlier versions don't say it; what was left lately of all changes is as much.
+                before = rows * arrays["left"][len(RATES)] if "left" in arrays else np.zeros(len(weights))
+                parts["squares"] = arrays.get(f"squares{k}", before)
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
         count = len(self.targets)
         say = np.array(data["say"], dtype=np.float64).reshape(len(KINDS), count, len(RATES))

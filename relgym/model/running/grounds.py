@@ -42,12 +42,12 @@ class Grounds(NamedTuple):
             book = parts.laws.learner.book
             things += (book.pair, book.inertia, *book.free.values())
             numbers += (parts.laws.governed, book.tolerance, tuple(book.free), dict(book.shares))
-        rough = set()
+        asked = set()
         for target in parts.targets:
             _read(parts.models[target], things, numbers, votes=not parts.governs(target))
-            if parts.models[target].rough:
-                rough.add(target.type)
-        for name in sorted(rough):
+            if parts.models[target].asks_regressions:
+                asked.add(target.type)
+        for name in sorted(asked):
             weights, others = parts.regressions[name].solved
             things += weights
             numbers.append(others)
@@ -74,7 +74,8 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
         classifier.modes,
         clusterer.approximate,
         model.surmise,
-        model.rough,
+        model.asks_regressions,
+        model.tells_how_far,
         known.lawless,
     )
     if not votes:

@@ -246,7 +246,11 @@ class _Lowering:
         regression = None
         if not governed:
             fields = self._modes(model, layout, index, body, situation, one)
-            regression = self._regression(target, index, signature, gather.tolist()) if model.rough else None
+            regression = (
+                self._regression(target, index, signature, gather.tolist())
+                if model.asks_regressions
+                else None
+            )
         return ir.Answer(
             layout.names[index],
             target.property,

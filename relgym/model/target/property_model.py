@@ -185,7 +185,6 @@ class PropertyModel:
         if weight > 1:
             self.clusterer.stand_for(report.mode, weight - 1)
         self._unsettled = _noisy(self.clusterer.labels[-RECENT:]) > LEFT_OPEN
-        self.calibration.accounted = self.accounted_for
         if report.mode != NOISE and self.latest not in report.fits:
             self.latest = report.mode
         self.fallback.unexplained = self._assess()
@@ -207,6 +206,7 @@ class PropertyModel:
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
         if played:
             self.casting.observe(self.mode(mode), seen, played, weight)
+        self.calibration.reliable = self.reliable
         return report
 
     def _of_now(self, report: ClusterReport) -> int:
@@ -385,10 +385,11 @@ class PropertyModel:
         left = float("inf") if budget is None else budget
         spent = self.classifier.refresh(left, self.amended)
         spent += self.casting.refresh(self.classifier.exemplars, left - spent, self.amended)
-        if self.amended and self.accounted_for:
-            revised = self.amended & self.classifier.flawless - self.casting.flawed
+        if revised := self.amended & self.reliable if self.amended else None:
             self.amended -= revised
             self.calibration.revise(revised)
+        if spent:
+            self.calibration.reliable = self.reliable
         return spent
 
     @property
@@ -396,6 +397,13 @@ class PropertyModel:
         """Whether laws explain what was seen: else what a mode got wrong may be what nothing explains."""
         known = self.clusterer
         return not known.approximate and known.noise_examples <= LEFT_OPEN * known.seen
+
+    @property
+    def reliable(self) -> frozenset[int]:
+        """Modes that are told from all others without an error in what is remembered, if laws explain what was seen."""
+        return (
+            frozenset(self.classifier.flawless - self.casting.flawed) if self.accounted_for else frozenset()
+        )
 
     def reconsider(self, table: ExampleTable, budget: Budget) -> None:
         """Guess anew where nothing is explained, and ask for hypotheses, if it is time, as far as the budget goes."""
@@ -450,12 +458,12 @@ class PropertyModel:
         values = self.functions.values_many(table, self.clusterer.rows[numbers], ids)
         labels, fits = self._credited(self.clusterer.labels[numbers], fits, values, ids)
         self.calibration.keep(ids)
-        self.calibration.accounted = self.accounted_for
         self.amended = set(ids) if self.limits != before else self.amended.intersection(ids)
         self.classifier.sync(ids, np.where(np.isin(labels, ids), labels, UNKNOWN), fits, values)
         self.casting.sync({m.id: m for m in self.modes})
         self.functions.recast(table, self.classifier.exemplars)
         self.casting.recall(self.classifier.exemplars)
+        self.calibration.reliable = self.reliable
 
     def _credited(
         self,
@@ -551,7 +559,7 @@ class PropertyModel:
             return False
         if self.fallback.inexact:
             return False
-        return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
+        return not self.bounds(self.latest) and self.asks_regressions
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -569,6 +577,11 @@ class PropertyModel:
     def record(self) -> Calibration:
         """What is known of earlier predictions; of a model that always answers nothing."""
         return self.calibration if self.config.abstain else _NOTHING
+
+    @property
+    def asks_regressions(self) -> bool:
+        """Whether regressions have a say: where little is known, or what won votes was off too often to be claimed."""
+        return self.rough or self.record.doubts(_PREDICTED)
 
     @property
     def rough(self) -> bool:

@@ -222,15 +222,39 @@ def test_modes_vouch_for_a_new_one_by_what_they_said_of_changes() -> None:
     assert known.assess(new, values(own=2.0, now=1.0)).speaker == OWN
 
 
-def test_where_much_is_unexplained_a_new_mode_is_to_prove_itself() -> None:
+def test_a_mode_that_is_not_reliable_is_to_prove_itself() -> None:
     known, new, said = right(50), KEY._replace(winner=2), values(own=1.0)
     assert known.assess(new, said).speaker == OWN
-    known.accounted = False
+    known.reliable = frozenset({KEY.winner})
     assert known.assess(new, said).speaker == PERSISTENCE
     assert known.assess(KEY, said).speaker == OWN  # which was right itself
     for _ in range(4):
         seen(known, said, 1.0, key=new)
     assert known.assess(new, said).speaker == OWN
+
+
+def test_regression_speaks_where_nobody_looked_back_if_it_leaves_little_of_other_rows() -> None:
+    known, new, said = right(50), KEY._replace(winner=2), values(own=1.0, regression=2.0)
+    known.reliable = frozenset({KEY.winner})
+    assert known.assess(new, said).speaker == PERSISTENCE
+    known.regressed(1000.0, 990.0, 1000.0)  # ahead by 7 bits, which is too little
+    assert known.assess(new, said).speaker == PERSISTENCE
+    known.regressed(1000.0, 500.0, 1000.0)
+    assert known.assess(new, said).speaker == REGRESSION
+    assert known.assess(KEY, said).speaker == OWN  # which was right there
+    again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    again.reliable = known.reliable
+    assert again.assess(new, said) == known.assess(new, said)
+
+
+def test_of_regression_late_trials_count_for_more() -> None:
+    known, errors = Calibration(0.9), np.linspace(3.0, 0.0, 200).tolist()  # it is off by less and less
+    for off in errors:
+        seen(known, values(regression=off, now=4.0), 0.0)
+    trials, squares, base = known._cells[KEY].squares[REGRESSION]
+    weights = np.square(np.arange(1, 201) / 200.0)  # of the i-th of n trials: (i / n)^2
+    assert squares / trials == pytest.approx(np.average(np.square(errors), weights=weights), rel=0.05)
+    assert (trials, base / trials) == (200.0, pytest.approx(16.0))
 
 
 def test_what_held_last_is_no_law_and_speaks_only_where_something_changes() -> None:
@@ -1048,7 +1072,7 @@ def test_shares_of_an_outcome_and_doubts() -> None:
     assert not sure.doubts(0)
     sure._cells[KEY].speaker = LATEST
     assert sure.doubts(0)
-    assert not sure.doubts(1)
+    assert sure.doubts(1)  # of which nothing was said
 
 
 def test_who_speaks_in_how_many_trials() -> None:

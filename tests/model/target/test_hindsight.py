@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT
+from relgym.model.predicting.calibration import OWN
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.target.hindsight import Hindsight
 from relgym.model.world_model import WorldModel
@@ -174,8 +175,10 @@ def test_right_predictions_make_up_for_wrong_ones(lottery: WorldModel) -> None:
     model = copy.deepcopy(lottery)
     law = pushes(1, seed=3)[0]
     said = model.predict_one(law.before)
+    (part,) = said.parts
+    right = part.audit.values[OWN] - part.value  # what the mode that won says, whoever gives the value
     for _ in range(RECENT):
-        model.look_back(said, {("self", "x"): 0.0})
+        model.look_back(said, {("self", "x"): right})
     assert not model.property_model("self", "x").unexplained
     assert model.predict_one(law.before)["self", "x"].outcome is Outcome.PREDICTED
     assert model.advice() == ()
