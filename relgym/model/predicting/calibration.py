@@ -968,12 +968,9 @@ class Calibration:
         return found
 
     def doubts(self, outcome: int) -> bool:
-        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead.
-
-        Or nobody could tell so far: nothing won, or what it reads was wrong.
-        """
+        """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
         if not self.share(outcome) >= 1.0 - self.allowed:
-            return self.trials > 0
+            return _family(Key(outcome, 1, 0)) in self._cells
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def failing(self, key: Key) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -559,7 +560,7 @@ class PropertyModel:
             return False
         if self.fallback.inexact:
             return False
-        return not self.bounds(self.latest) and self.asks_regressions
+        return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
@@ -580,8 +581,16 @@ class PropertyModel:
 
     @property
     def asks_regressions(self) -> bool:
-        """Whether regressions have a say: where little is known, or what won votes was off too often to be claimed."""
-        return self.rough or self.record.doubts(_PREDICTED)
+        """Whether regressions have a say: where little is known, or what won votes was off too often to be claimed.
+
+        Or where nobody can tell, since nothing won so far, or what it read was wrong.
+        """
+        known = self.record
+        return (
+            self.rough
+            or known.doubts(_PREDICTED)
+            or (known.trials > 0 and math.isnan(known.share(_PREDICTED)))
+        )
 
     @property
     def rough(self) -> bool:

@@ -1072,7 +1072,7 @@ def test_shares_of_an_outcome_and_doubts() -> None:
     assert not sure.doubts(0)
     sure._cells[KEY].speaker = LATEST
     assert sure.doubts(0)
-    assert sure.doubts(1)  # of which nothing was said
+    assert not sure.doubts(1)
 
 
 def test_who_speaks_in_how_many_trials() -> None:
