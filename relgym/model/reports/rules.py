@@ -24,7 +24,7 @@ rests, and doesn't bounce with no velocity.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -41,6 +41,7 @@ from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
+from relgym.model.target.conditions import needed
 from relgym.model.target.property_model import PropertyModel
 from relgym.numeric.decision_list import Rule, decision_list
 from relgym.numeric.tree import DecisionTree
@@ -50,7 +51,7 @@ from relgym.reporting.motion import MotionRules
 from relgym.reporting.naming import named
 from relgym.reporting.rules import Bound, Branch, Derivation, Experience, PropertyRules, RuleList, RuleRole
 from relgym.scene.axes import Axes
-from relgym.scene.objects import Scene, SceneLayout
+from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def rule_list(model: WorldModel) -> RuleList:
         if not model.governs(target)
     ]
     properties = tuple(replace(_property(part), advice=advice.get(str(part.target), "")) for part in parts)
-    return of_laws(model, RuleList(model.seen, _scope(model), properties))
+    return of_laws(model, doubted(RuleList(model.seen, _scope(model), properties), parts))
 
 
 def of_laws(model: WorldModel, rules: RuleList) -> RuleList:
@@ -200,7 +201,6 @@ def _property(part: PropertyModel) -> PropertyRules:
         roles,
         steps,
         part.clusterer.noise_examples,
-        _doubt(part),
         experience=_experience(part),
         ended=tuple(mode.formula() for mode in part.modes if mode.id in part.past),
     )
@@ -217,10 +217,35 @@ def _experience(part: PropertyModel) -> Experience | None:
 
 def doubted(rules: RuleList, models: Iterable[PropertyModel]) -> RuleList:
     """The rules, with what is known by now of whether they are right (`relgym.model.target.hindsight`)."""
-    known = {str(part.target): _doubt(part) for part in models}
+    known = {str(target): why for target, why in _doubts(tuple(models)).items()}
     return replace(
         rules, properties=tuple(replace(p, doubt=known.get(p.target, p.doubt)) for p in rules.properties)
     )
+
+
+_UNTRIED: Final = "nobody could tell yet whether it is right"
+
+
+def _doubts(parts: Sequence[PropertyModel]) -> dict[Target, str]:
+    """Why each property's list predicts nothing, also since all of it reads what isn't predicted; empty if it does."""
+    found = {part.target: _doubt(part) for part in parts}
+    told = {part.target for part in parts if part.explained_by is not None}
+    silent = {(t.type, t.property) for t, why in found.items() if why and t not in told}
+    waiting = [part for part in parts if found[part.target] in ("", _UNTRIED)]
+    while reading := {part.target: names for part in waiting if (names := _reads(part, silent))}:
+        for target, names in reading.items():
+            found[target] = f"it reads next values that aren't predicted: {', '.join(names)}"
+        silent |= {(target.type, target.property) for target in reading}
+        waiting = [part for part in waiting if part.target not in reading]
+    return found
+
+
+def _reads(part: PropertyModel, silent: Collection[tuple[str, str]]) -> list[str]:
+    """Those of some properties whose next values its modes read, if each mode reads one."""
+    read = [needed(part.target, [part.mode(mode)], ()).intersection(silent) for mode in part.classifier.modes]
+    own = part.target.type
+    names = {prop if name == own else f"{name}.{prop}" for name, prop in frozenset().union(*read)}
+    return sorted(names) if all(read) else []
 
 
 def _doubt(part: PropertyModel) -> str:
@@ -234,7 +259,10 @@ def _doubt(part: PropertyModel) -> str:
     if part.doubtful:
         if part.calibration.paused(_PREDICTED):
             return "what it reads was predicted wrongly, and not rightly again yet"
-        share = max(100.0 * told.probability for _, _, told in part.calibration.kinds(_PREDICTED))
+        shares = [100.0 * told.probability for _, _, told in part.calibration.kinds(_PREDICTED)]
+        if not shares:
+            return _UNTRIED
+        share = max(shares)
         return f"at best {share:.3g} % of such predictions are expected to be right, too few to claim any"
     known = part.calibration.trials and part.config.abstain
     return "nothing tells yet which of these holds" if part.undecided and not known else ""

@@ -39,6 +39,7 @@ from relgym.model.target.limits import Limits, find_limits
 from relgym.model.target.scope import EVERYWHERE, Scope, find_scope
 from relgym.model.target.spread import Spreads, measure
 from relgym.model.target.stops import Stops, find_stops
+from relgym.program.records import NO_RUNNER_UP
 from relgym.scene.objects import Target
 from relgym.scene.schema import SceneSchema
 from relgym.scheduling.agenda import Budget
@@ -546,9 +547,15 @@ class PropertyModel:
 
     @property
     def doubtful(self) -> bool:
-        """Whether no kind of its modes' predictions came true often enough to be claimed."""
-        kinds = [(key, told) for key, _, told in self.record.kinds(_PREDICTED)]
-        return bool(kinds) and not any(self.claims(key, told) for key, told in kinds)
+        """Whether no kind of its modes' predictions came true often enough to be claimed, nor would a new one be."""
+        known = self.record
+        if not known.trials:
+            return False
+        kinds = [(key, told) for key, _, told in known.kinds(_PREDICTED)]
+        new = {*self.classifier.modes} - {key.winner for key, _ in kinds}
+        keys = [Key(_PREDICTED, mode, NO_RUNNER_UP) for mode in sorted(new)]
+        kinds += [(key, known.assess(key, (0.0,) * known.experts)) for key in keys]
+        return not any(self.claims(key, told) for key, told in kinds)
 
     @property
     def asks_latest(self) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from points import schema_of, transitions
 
 import relgym
 from relgym.clustering.mode import NOISE
@@ -23,6 +24,7 @@ from relgym.errors import ConfigError
 from relgym.experiments.data import ball_episodes, truck_episodes
 from relgym.experiments.episodes import Episode
 from relgym.experiments.worlds.online import learned
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.reports.rules import agreement, rule_list
 from relgym.model.target.limits import Limits
 from relgym.model.target.scope import Scope
@@ -336,3 +338,24 @@ def test_what_both_leave_open_agrees() -> None:
     equal, none = _same(value, rule, np.full(5, 1.0))  # values change by 1: slack 1e-4
     assert equal.tolist() == [True, False, True, False, False]
     assert none.tolist() == [False, False, True, False, False]
+
+
+def test_a_law_that_reads_what_is_not_predicted_predicts_nothing_and_says_so() -> None:
+    schema, rng = schema_of(("x", "y"), ("a",)), np.random.default_rng(0)
+    starts, actions = rng.normal(size=(400, 2)), rng.normal(size=(400, 1))
+
+    def step(now: np.ndarray, a: np.ndarray) -> list[float]:
+        noise = float(rng.normal())
+        return [0.5 * now[0] + noise, noise]
+
+    model = WorldModel(schema)
+    for transition in transitions(schema, step, starts, actions):
+        compare_and_learn(model, transition, model.predict_one(transition.before))
+    (reading,) = (part for part in model.rules().properties if part.doubt.startswith("it reads"))
+    other = {"self.x": "y", "self.y": "x"}[reading.target]
+    assert reading.doubt == f"it reads next values that aren't predicted: {other}"
+    assert f"no prediction: {reading.doubt}" in model.describe()
+    assert all(part.doubt for part in model.rules().properties)
+    assert not any(
+        part.ok for part in model.predict_one(model.schema.scene({"self": [0.0, 0.0], ACTION: [0.0]})).parts
+    )
