@@ -946,6 +946,8 @@ class Calibration:
     def regressed(self, trials: float, squares: float, persistence: float) -> None:
         """Take in what regression leaves of rows like those it was fitted to: nobody may have looked back at most.
 
+        Who was never told how predictions came out doubts nothing, and has no use for it.
+
         Parameters
         ----------
         trials
@@ -953,6 +955,8 @@ class Calibration:
         squares, persistence
             What it leaves of as many others, and what saying that nothing changes does.
         """
+        if not self.trials:
+            return
         cell = self._cells.setdefault(_beside(OF_REGRESSION), _Cell.new(PERSISTENCE, self.experts))
         cell.squares[REGRESSION] = [trials, squares, persistence]
         cell.squares[PERSISTENCE] = [trials, persistence, persistence]

@@ -247,6 +247,12 @@ def test_regression_speaks_where_nobody_looked_back_if_it_leaves_little_of_other
     assert again.assess(new, said) == known.assess(new, said)
 
 
+def test_what_regression_leaves_is_taken_in_once_somebody_looked_back() -> None:
+    known = Calibration(0.9)
+    known.regressed(1000.0, 500.0, 1000.0)
+    assert known.to_json() == Calibration(0.9).to_json()
+
+
 def test_of_regression_late_trials_count_for_more() -> None:
     known, errors = Calibration(0.9), np.linspace(3.0, 0.0, 200).tolist()  # it is off by less and less
     for off in errors:
