@@ -230,19 +230,21 @@ def _doubts(parts: Sequence[PropertyModel]) -> dict[Target, str]:
     """Why each property's list predicts nothing, also since all of it reads what isn't predicted; empty if it does."""
     found = {part.target: _doubt(part) for part in parts}
     told = {part.target for part in parts if part.explained_by is not None}
-    silent = {(t.type, t.property) for t, why in found.items() if why and t not in told}
+    unpredicted = {(t.type, t.property) for t, why in found.items() if why and t not in told}
     waiting = [part for part in parts if found[part.target] in ("", _UNTRIED)]
-    while reading := {part.target: names for part in waiting if (names := _reads(part, silent))}:
+    while reading := {part.target: names for part in waiting if (names := _reads(part, unpredicted))}:
         for target, names in reading.items():
             found[target] = f"it reads next values that aren't predicted: {', '.join(names)}"
-        silent |= {(target.type, target.property) for target in reading}
+        unpredicted |= {(target.type, target.property) for target in reading}
         waiting = [part for part in waiting if part.target not in reading]
     return found
 
 
-def _reads(part: PropertyModel, silent: Collection[tuple[str, str]]) -> list[str]:
+def _reads(part: PropertyModel, unpredicted: Collection[tuple[str, str]]) -> list[str]:
     """Those of some properties whose next values its modes read, if each mode reads one."""
-    read = [needed(part.target, [part.mode(mode)], ()).intersection(silent) for mode in part.classifier.modes]
+    read = [
+        needed(part.target, [part.mode(mode)], ()).intersection(unpredicted) for mode in part.classifier.modes
+    ]
     own = part.target.type
     names = {prop if name == own else f"{name}.{prop}" for name, prop in frozenset().union(*read)}
     return sorted(names) if all(read) else []
