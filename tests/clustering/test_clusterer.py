@@ -121,7 +121,6 @@ def test_coefficients_are_exact(rng: np.random.Generator) -> None:
     assert mode.intercept == pytest.approx(0.0004243524, abs=1e-12)
 
 
-# ---------------------------------------------------------------------- noise
 def test_a_function_that_is_another_one_once_it_is_fitted_to_more_is_reported(
     rng: np.random.Generator,
 ) -> None:
@@ -136,6 +135,7 @@ def test_a_function_that_is_another_one_once_it_is_fitted_to_more_is_reported(
     assert not any(report.created or report.removed for report in reports)
 
 
+# ---------------------------------------------------------------------- noise
 def test_what_obeys_nothing_stays_noise(rng: np.random.Generator) -> None:
     stream = Stream()
     stream.feed(states(rng, 120), rng.normal(size=120))

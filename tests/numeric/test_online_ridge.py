@@ -17,24 +17,25 @@ def rows(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return x, np.stack([x @ [1.0, -2.0, 0.5] + 3.0, rng.normal(size=n)], axis=1)
 
 
-def test_it_is_ridge_regression_of_standardised_columns() -> None:
-    x, y = rows(80)
-    ridge = OnlineRidge(3)
+def fitted(x: np.ndarray, y: np.ndarray) -> OnlineRidge:
+    """To all rows, one after the other."""
+    ridge = OnlineRidge(x.shape[1])
     for one, response in zip(x, y, strict=True):
         ridge.add(one, response)
     ridge.solve()
-    z = (x - x.mean(axis=0)) / x.std(axis=0)
+    return ridge
+
+
+def test_it_is_ridge_regression_of_standardised_columns() -> None:
+    x, y = rows(80)
+    ridge, z = fitted(x, y), (x - x.mean(axis=0)) / x.std(axis=0)
     expected = np.linalg.solve(z.T @ z + np.eye(3), z.T @ (y - y.mean(axis=0)))
     np.testing.assert_allclose(ridge.predict(x), z @ expected + y.mean(axis=0), atol=1e-9)
 
 
 def test_what_is_left_is_generalised_cross_validation() -> None:
     x, y = rows(40)
-    ridge = OnlineRidge(3)
-    for one, response in zip(x, y, strict=True):
-        ridge.add(one, response)
-    ridge.solve()
-    z = (x - x.mean(axis=0)) / x.std(axis=0)
+    ridge, z = fitted(x, y), (x - x.mean(axis=0)) / x.std(axis=0)
     hat = 1.0 / 40 + z @ np.linalg.solve(z.T @ z + np.eye(3), z.T)
     remains = np.square(y - hat @ y).mean(axis=0)
     np.testing.assert_allclose(ridge.left, remains / (1.0 - np.trace(hat) / 40) ** 2, rtol=1e-6)

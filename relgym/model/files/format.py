@@ -452,7 +452,7 @@ Kind: TypeAlias = tuple[
             ge=-4,
             le=13,
             description="bin of the lead, from 8 on of how far an approximation is asked from what it was made of; "
-            "below 0: all of a winner's, of all modes or laws, all",
+            "below 0: all of a winner's, of all modes or laws, all, what regression leaves of all it was fitted to",
         ),
     ],
 ]

@@ -247,18 +247,18 @@ def _learn_object(
     row = table.add(situation.signature, x, situation.keys[0], bodies)
     example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
-    asked = False
+    rough = False  # not `asks_regressions`: what is learned doesn't depend on whether somebody looks back
     for target, model in parts.by_type[type_name]:
         column = layout.column(index, target.property)
         y = float(following[column])
-        asked = asked or model.rough
+        rough = rough or model.rough
         changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
         if target.property in weights:
             report = model.learn_one(
                 table, row, y, situation.signature, example, budget, weights[target.property]
             )
             reports[name, target.property] = report
-    if asked and parts.regressions[type_name].learn_one(situation.signature, x, changes):
+    if rough and parts.regressions[type_name].learn_one(situation.signature, x, changes):
         _tell_regressed(parts, type_name)
         budget.spend(parts.regressions[type_name].solving_cells)
     return moved

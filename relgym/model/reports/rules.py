@@ -502,10 +502,10 @@ def _spelled(part: PropertyModel, classifier: BinaryClassifier, functions: dict[
     turned = plain[len(sums) :]
     names = [name for name, _ in scope.present]
     for name, (own, f) in zip(turned, ((p, f) for p in names for f in (i, j)), strict=True):
-        number = (
-            f.constant if not f.terms and f.constant else None
-        )  # a multiple of one property is a sum, too
-        product = f"({f.text(_EXACT)}) * {own}" if number is None else Sum(((number, own),)).text(_EXACT)
+        if f.terms or not f.constant:
+            product = f"({f.text(_EXACT)}) * {own}"
+        else:  # a multiple of one property is a sum, too
+            product = Sum(((f.constant, own),)).text(_EXACT)
         texts[name] = product if closed else ""
     return texts
 

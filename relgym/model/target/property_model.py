@@ -387,7 +387,7 @@ class PropertyModel:
         left = float("inf") if budget is None else budget
         spent = self.classifier.refresh(left, self.amended)
         spent += self.casting.refresh(self.classifier.exemplars, left - spent, self.amended)
-        if revised := self.amended & self.reliable if self.amended else None:
+        if self.amended and (revised := self.amended & self.reliable):
             self.amended -= revised
             self.calibration.revise(revised)
         if spent:
