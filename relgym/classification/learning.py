@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from relgym.config import ClassificationConfig
 from relgym.config.constants import CALL, SHORT
 from relgym.logic.clause import Clause, Definition
 from relgym.logic.csp import matches
-from relgym.logic.foil import FoilConfig, learn_both
+from relgym.logic.facts import Facts
+from relgym.logic.foil import FoilConfig, learn_both, recounted
 from relgym.numeric.tree import DecisionTree, learn_tree
 from relgym.scheduling.work import Steps, resumable
 
@@ -66,11 +68,18 @@ def foil_config(config: ClassificationConfig) -> FoilConfig:
 
 @resumable
 def learn_pair(
-    i: int, j: int, lesson: Lesson, scope: Scope, config: ClassificationConfig
+    i: int,
+    j: int,
+    lesson: Lesson,
+    scope: Scope,
+    config: ClassificationConfig,
+    known: BinaryClassifier | None = None,
 ) -> Steps[BinaryClassifier]:
     """Learn to tell mode `i` from mode `j`: in one context after the other, until a definition settles it.
 
-    With examples of one mode only there is nothing to tell: the result has no clause and votes for that mode.
+    What is `known` stays where nothing better is found: searches are greedy, and conditions that tell nothing unless
+    they come together are found of few examples sooner than of many. With examples of one mode only there is nothing
+    to tell: the result has no clause and votes for that mode.
     """
     if not all(lesson.counts):
         return majority(i, j, scope, lesson.counts)
@@ -79,6 +88,13 @@ def learn_pair(
         found = definitions[context] = yield from _define(lesson, context, scope, config)
         if _settles(found, context):
             break
+    if known is not None and known.definition.clauses:
+        yield CALL
+        stands = recounted(
+            known.definition, *_classes(lesson, known.context, scope), **_weighed(lesson, config)
+        )
+        if known.context not in definitions or stands.rank < definitions[known.context].rank:
+            definitions[known.context] = stands
     # as between polarities, errors count first; the narrowest context wins ties
     best = min(definitions.items(), key=lambda each: each[1].rank)
     work = sum(each.work for each in definitions.values())
@@ -109,18 +125,26 @@ def _contexts(lesson: Lesson) -> list[Context]:
 def _define(
     lesson: Lesson, context: Context, scope: Scope, config: ClassificationConfig
 ) -> Steps[Definition]:
-    facts = lesson.view.facts(context, scope)
-    tuples, is_i, weights = lesson.view.tuples(lesson.rows), lesson.is_i, lesson.weights
+    shown = _classes(lesson, context, scope)
     yield CALL
-    found: Definition = yield from learn_both.steps(
-        facts,
-        tuples[is_i],
-        tuples[~is_i],
-        pos_weights=weights[is_i],
-        neg_weights=weights[~is_i],
-        config=foil_config(config),
-    )
+    found: Definition = yield from learn_both.steps(*shown, **_weighed(lesson, config))
     return found
+
+
+def _classes(lesson: Lesson, context: Context, scope: Scope) -> tuple[Facts, _Rows, _Rows]:
+    """The facts of a context, and the tuples of the first and of the second mode."""
+    tuples = lesson.view.tuples(lesson.rows)
+    return lesson.view.facts(context, scope), tuples[lesson.is_i], tuples[~lesson.is_i]
+
+
+def _weighed(lesson: Lesson, config: ClassificationConfig) -> dict[str, Any]:
+    """Their weights, and FOIL's settings."""
+    weights = lesson.weights
+    return {
+        "pos_weights": weights[lesson.is_i],
+        "neg_weights": weights[~lesson.is_i],
+        "config": foil_config(config),
+    }
 
 
 def _with_trees(

@@ -107,7 +107,8 @@ class PairState:
             if mended is not None:
                 self._adopt(mended, lesson, mended=True)
                 return work + mended.work
-            self.draft = Task(learn_pair, *self.modes, lesson.alone(), self.classifier.scope, config)
+            known = self.classifier
+            self.draft = Task(learn_pair, *self.modes, lesson.alone(), known.scope, config, known)
             self._taught = lesson.counts
             if mendable:
                 return work

@@ -57,17 +57,17 @@ class Cover:
         everything = self._problem.count(np.ones(self._tables.size, dtype=np.bool_))
         if everything.positives <= 0 or everything.negatives <= 0:
             # a single class: the clause without literals covers it
-            return self._definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
+            return self.definition([Clause((), self._tables.arity)] if everything.positives > 0 else [])
         if not self._config.mdl:
-            return self._definition((yield from self._clauses(self._config, math.inf, pure=True)))
+            return self.definition((yield from self._clauses(self._config, math.inf, pure=True)))
         # relations alone first: thresholds that tell most tuples apart would crowd them out of the beam
-        best = self._definition((yield from self._clauses(replace(self._config, numeric=False), limit)))
+        best = self.definition((yield from self._clauses(replace(self._config, numeric=False), limit)))
         looks = [(False, 1), (True, SHORT)] if self._tables.functions else [(True, SHORT)]
         for pure, enough in looks:
             if best.errors <= ROUNDED and sum(map(len, best.clauses)) <= enough:
                 break
             clauses = yield from self._clauses(self._config, min(limit, best.bits), pure=pure)
-            other = self._definition(clauses)
+            other = self.definition(clauses)
             best = other if other.bits < best.bits - ROUNDED else best
         return replace(best, work=self._work)
 
@@ -138,7 +138,8 @@ class Cover:
         covered = np.logical_or.reduce(matched)
         return self._problem.count(covered).negatives + self._problem.count(~covered).positives
 
-    def _definition(self, clauses: Sequence[Clause]) -> Definition:
+    def definition(self, clauses: Sequence[Clause]) -> Definition:
+        """What some clauses cover, one after the other, and how many bits they take."""
         left = np.ones(self._tables.size, dtype=np.bool_)
         coverage = []
         for clause in clauses:

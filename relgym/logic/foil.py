@@ -23,7 +23,7 @@ from relgym.logic.facts import Facts, Float, Int
 from relgym.logic.tables import Tables
 from relgym.scheduling.work import Steps, resumable
 
-__all__ = ["FoilConfig", "learn", "learn_both"]
+__all__ = ["FoilConfig", "learn", "learn_both", "recounted"]
 
 
 @resumable
@@ -102,6 +102,25 @@ def learn_both(
     if other.rank < given.rank:
         return replace(other, negated=True, work=work)
     return replace(given, work=work)
+
+
+def recounted(
+    definition: Definition,
+    facts: Facts,
+    positives: Int,
+    negatives: Int,
+    *,
+    pos_weights: ArrayLike | None = None,
+    neg_weights: ArrayLike | None = None,
+    config: FoilConfig | None = None,
+) -> Definition:
+    """A definition with coverage and bits as of these tuples; what `learn_both` finds of them compares with it.
+
+    Parameters and errors are those of `learn_both`. Cost: the clauses, once for each tuple.
+    """
+    task = _cover(facts, positives, negatives, pos_weights, neg_weights, config)
+    task = task.swapped() if definition.negated else task
+    return replace(task.definition(definition.clauses), negated=definition.negated)
 
 
 def _cover(

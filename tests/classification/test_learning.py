@@ -101,6 +101,34 @@ def _speeds(
     return learn_pair(0, 1, lesson, Scope.of(vocabulary, config, (0, 1)), config), lesson
 
 
+def _switched(noise: float, known: BinaryClassifier | None = None) -> tuple[BinaryClassifier, float]:
+    """A sign that a switch with eight places turns: neither tells anything alone; 12 others are noise, or nothing."""
+    count = 1_500
+    rng, names = np.random.default_rng(0), ("sign", "turn", *(f"x{k}" for k in range(12)))
+    vocabulary = Vocabulary(relations=("intersect",), unary=("ball", "floor"), own=names)
+    sign, switch = rng.choice([-1.0, 1.0], count), rng.integers(8, size=count)
+    own = np.column_stack([sign, switch, noise * rng.normal(size=(count, 12))])
+    table = np.array([[[False, True], [True, False]]])
+    some = [Example(table, np.eye(2, dtype=bool), np.ones(2, bool), np.empty((2, 0)), each) for each in own]
+    view = View.of_batch(ExampleBatch.stack(some), (0, 1), np.zeros((count, 2)))
+    lesson = Lesson(view, np.arange(count), (sign > 0) == np.isin(switch, (2, 3, 6, 7)), np.ones(count))
+    config = ClassificationConfig()
+    found = learn_pair(0, 1, lesson, Scope.of(vocabulary, config, (0, 1)), config, known)
+    return found, float(np.mean(found.says_i_batch(lesson.view, lesson.rows) != lesson.is_i))
+
+
+def test_what_is_known_stays_where_nothing_better_is_found() -> None:
+    # A greedy search finds what tells something only together by chance: of much noise some seems to tell more.
+    known, errors = _switched(0.0)
+    assert errors == 0.0
+    anew, errors = _switched(1.0)
+    assert errors > 0.3
+    again, errors = _switched(1.0, known)
+    assert (errors, again.definition.errors, again.definition.clauses) == (0.0, 0.0, known.definition.clauses)
+    assert sum(c.positives for c in again.definition.coverage) > 600
+    assert _switched(0.0, anew)[0].definition == known.definition  # which is better than what was known
+
+
 def test_trees_help_where_clauses_cannot() -> None:
     # §3.4.4: speeds of one mode lie between those of the other, which one threshold can't say.
     speeds = np.linspace(-1.0, 1.0, 400)

@@ -13,7 +13,7 @@ from relgym.errors import ConfigError
 from relgym.logic.clause import Definition
 from relgym.logic.csp import decide
 from relgym.logic.facts import Facts, facts_from_tuples
-from relgym.logic.foil import FoilConfig, learn, learn_both
+from relgym.logic.foil import FoilConfig, learn, learn_both, recounted
 
 TEXTBOOK = FoilConfig(mdl=False)
 """A handful of exact examples can't pay for clauses in bits; the textbook's FOIL doesn't ask them to."""
@@ -361,6 +361,16 @@ def test_a_definition_never_errs_more_than_the_larger_class(seed: int, mdl: bool
     wrong = (decide(definition, facts, tuples) != truth).sum()
     assert wrong == definition.errors
     assert wrong <= min(truth.sum(), (~truth).sum())
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 10_000))
+def test_a_definition_counted_again_is_what_it_was(seed: int) -> None:
+    facts, tuples, truth = _random_problem(seed)
+    found = _solve(facts, tuples, truth)
+    again = recounted(found, facts, tuples[truth], tuples[~truth])
+    for part in ("clauses", "negated", "coverage", "uncovered", "bits", "rank"):
+        assert getattr(again, part) == getattr(found, part)
 
 
 @settings(max_examples=15)
