@@ -128,20 +128,24 @@ class Binding:
         return tuple(next(played) if slot < 0 else slot for slot in self.forced)
 
 
-def bind(mode: Mode, signature: SlotSignature) -> Binding | None:
-    """Lay a mode over a signature; None when some role has no object or column that could play it."""
+def bind(mode: Mode, signature: SlotSignature, played: tuple[int, ...] = ()) -> Binding | None:
+    """Lay a mode over a signature; None when some role has no object or column that could play it.
+
+    `played`: slot of every role but the target's, if it is known where they always stand.
+    """
     by_type = signature.slots_by_type
     if not signature.offers(prop for prop, _ in mode.roles[0].terms):
         return None
     fixed = [(signature.column(0, prop), weight) for prop, weight in mode.roles[0].terms]
     forced: list[int] = []
     open_roles: list[Role] = []
-    for role in mode.open_roles:
+    for k, role in enumerate(mode.open_roles):
         slots = by_type.get(role.type, ())
         wanted = sum(r.type == role.type for r in mode.open_roles)
         # Next values of a type are columns only where they were asked for, or where an object is alone of its type.
         if len(slots) < wanted or not all(signature.has(s, prop) for s in slots for prop, _ in role.terms):
             return None
+        slots = slots if not played or played[k] not in slots else (played[k],)
         if len(slots) == 1:
             forced.append(slots[0])
             fixed += [(signature.column(slots[0], prop), weight) for prop, weight in role.terms]

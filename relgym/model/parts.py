@@ -18,7 +18,7 @@ from relgym.config import ModelConfig
 from relgym.config.constants import LAYOUTS, MOST_TARGETS
 from relgym.errors import ConfigError, ObservationError, QueryError, SchemaError
 from relgym.model.percepts.perception import Percept, Perception
-from relgym.model.percepts.scenes import mismatch, next_values, passage
+from relgym.model.percepts.scenes import Arrival, mismatch, next_values, passage
 from relgym.model.percepts.screening import Screen
 from relgym.model.predicting.chaining import Inquiry, Look, in_order
 from relgym.model.predicting.motion import Laws, possible_targets
@@ -94,6 +94,8 @@ class Parts:
         Whether it is known that nothing is under way or due, as long as nothing is learned.
     screen
         Tells gross errors in observations, which aren't learned from.
+    arrival
+        The scene that the latest transition came to; None before any.
     """
 
     def __init__(self, schema: SceneSchema, config: ModelConfig, targets: Sequence[Target] | None) -> None:
@@ -122,6 +124,7 @@ class Parts:
         self.agenda = Agenda(earned=config.cells_per_step, most=config.most_cells, saved=config.saved_cells)
         self.idle = False
         self.screen = Screen()
+        self.arrival: Arrival | None = None
         self.laws: Laws | None = None
         if config.frames == "auto":
             self.laws = Laws(schema, None if targets is None else tuple(targets), config)
@@ -165,6 +168,18 @@ class Parts:
             return False
         self._known[id(layout)] = layout  # kept alive, so that its id stays its own
         return True
+
+    @property
+    def recalls(self) -> bool:
+        """Whether the mode that held last is asked of what follows the latest transition, which programs can't do."""
+        return self.arrival is not None and any(
+            m.asks_latest for t, m in self.models.items() if not self.governs(t)
+        )
+
+    def resumed(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Of which of n scenes the mode that held last is asked, ascending."""
+        rows = np.empty(0, dtype=np.intp) if self.arrival is None else self.arrival.rows(layout, vectors)
+        return rows if len(rows) and self.recalls else rows[:0]
 
     def check(self, scene: Scene) -> None:
         """Raise `ObservationError` for NaN, infinity, what is no scene, or one of another schema.

@@ -40,7 +40,7 @@ from relgym.model.percepts.locality import (
     predict_many_locally,
 )
 from relgym.model.percepts.perception import Percept, Situation
-from relgym.model.percepts.scenes import next_values, with_action
+from relgym.model.percepts.scenes import Arrival, next_values, with_action
 from relgym.model.predicting.prediction import BatchPrediction, Outcome, ScenePrediction
 from relgym.model.predicting.querying import predict, predict_many
 from relgym.model.predicting.score import Score, scored
@@ -333,6 +333,7 @@ class WorldModel:
             report = learn_locally(self._parts, self._near(before), transition, self.seen, told, confirmed)
         else:
             report = learn(self._parts, self._perceive(before), transition, None, told, confirmed)
+        self._parts.arrival = Arrival(transition.after.layout, transition.after.vector)
         self.seen += 1
         return report
 
@@ -611,7 +612,21 @@ class WorldModel:
         if vectors.ndim != 2 or vectors.shape[1] != layout.width or vectors.dtype != np.float64:
             return None
         runner = self._programs.of(parts, layout, len(vectors))
-        return None if runner is None else runner.many(np.ascontiguousarray(vectors))
+        found = None if runner is None else runner.many(np.ascontiguousarray(vectors))
+        return found if found is None else self._resumed(layout, vectors, found)
+
+    def _resumed(
+        self, layout: SceneLayout, vectors: NDArray[np.float64], told: BatchPrediction
+    ) -> BatchPrediction:
+        """What a program says of n scenes, with what arrays say of those of which it doesn't know all."""
+        rows = self._parts.resumed(layout, vectors)
+        if len(rows):
+            said = predict_many(
+                self._parts, self._parts.perception.percept(layout, vectors[rows]), layout, vectors[rows]
+            )
+            for name in ("vectors", "modes", "outcomes", "margins", "probabilities", "intervals"):
+                getattr(told, name)[rows] = getattr(said, name)
+        return told
 
     def _near(self, scene: Scene) -> Neighbourhoods:
         """A large scene, taken apart; the last one is remembered."""
@@ -652,7 +667,7 @@ class WorldModel:
             told = None if runner is None else runner.many(vectors, on_card=True)
             if told is None:
                 raise ConfigError(_TAKES_ARRAYS)
-            return told
+            return self._resumed(layout, vectors, told)
         if (found := self._run_many(layout, vectors)) is not None:
             return found
         vectors = self._parts.checked_batch(layout, vectors)
@@ -752,12 +767,15 @@ class WorldModel:
             if not np.isfinite(taken).all():
                 raise ObservationError("actions: some are NaN or infinite")
         runner = self._runner(layout, steps * len(vectors), on_card=on_card)
-        found = None if runner is None else runner.roll(vectors, steps, taken, first, on_card=on_card)
-        if found is not None:
-            return found
-        if on_card:
+        if on_card and runner is None:
             raise ConfigError(_TAKES_ARRAYS)
-        return step_by_step(self.predict_batch, layout, vectors, taken, first)
+        if runner is not None and not self._parts.recalls:
+            found = runner.roll(vectors, steps, taken, first, on_card=on_card)
+            if found is not None:
+                return found
+            if on_card:
+                raise ConfigError(_TAKES_ARRAYS)
+        return step_by_step(partial(self.predict_batch, device=device), layout, vectors, taken, first)
 
     def _runner(self, layout: SceneLayout, scenes: int, *, on_card: bool) -> Runner | None:
         """What runs the program for a layout, of which so many scenes are asked; for a card whether it pays or not."""

@@ -1715,7 +1715,7 @@ def consult(s, a, k, value):
     s.far[k] = 0
     if s.code[a + 26]:
         regress(s, s.code[a + 26], k)
-    said[LATEST] = total(s, s.code[s.code[a + 27] + 2]) if s.code[a + 27] else math.nan
+    said[LATEST] = math.nan  # no program knows what held last
     able = np.int64(0)
     for expert in range(PERSISTENCE):
         if math.isfinite(said[expert]):
@@ -1758,8 +1758,6 @@ def settled(s, a, k, value, outcome, mode, margin, able):
         outcome = UNSURE if outcome == PREDICTED else outcome
     elif outcome == UNEXPLAINED and winner:
         outcome = PREDICTED
-    if speaker == LATEST and winner:
-        mode = s.code[s.code[a + 27]]
     return s.experts[k, speaker] if speaker < PERSISTENCE else math.nan, outcome, mode
 
 

@@ -619,8 +619,6 @@ class Trust:
         One for each kind.
     lawful
         Whether winners are laws.
-    latest
-        The mode that held last; 0 where nobody asks it.
     distant
         Whether kinds of what modes say far from what was learned have the bin of that instead of a lead.
     rests
@@ -629,7 +627,6 @@ class Trust:
 
     beliefs: tuple[Belief, ...]
     lawful: bool
-    latest: int
     distant: bool = False
     rests: tuple[int, ...] = ()
 

@@ -570,7 +570,7 @@ class _Source:
         )
         add("# whose values there are (bits of EXPERTS): who speaks, and how sure that is")
         add(f"EXPERTS = {ir.EXPERTS!r}")
-        for number, a in enumerate(self.program.answers):
+        for a in self.program.answers:
             trust = a.trust
             if trust is None:
                 told.append("None")
@@ -582,14 +582,12 @@ class _Source:
                     sure = f"{_number(b.probability)}, {_number(b.interval)}, {b.claimed}"
                     add(f"    ({b.outcome}, {b.winner}, {b.lead}, {b.able}): ({b.speaker}, {sure}),")
                 add("}")
-            name = self._called(number)
-            latest = f"({trust.latest}, {name}_mode_{trust.latest})" if trust.latest else "None"
             kind = f"{trust.lawful}, {trust.distant}, {trust.rests!r}"
-            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind}, {latest})")
+            told.append(f"(BELIEFS_{known.index(trust.beliefs)}, {kind})")
         add(
             "# beliefs; whether of laws, and by how far a scene lies from what was learned; keys that modes rely on;"
         )
-        add("# the mode that held last; of each answer below")
+        add("# of each answer below")
         add("TRUST = (\n" + "".join(f"    {each},\n" for each in told) + ")\n")
 
     def _fit(self, number: int, fit: ir.Fit) -> None:
@@ -824,11 +822,10 @@ def settled(number, said, outcome, mode, margin, x, odds):
     if TRUST[number] is None:
         known = next((each for each in (value, guess) if math.isfinite(each)), regression)
         return known, outcome, mode, (math.nan, math.nan)
-    beliefs, lawful, distant, rests, latest = TRUST[number]
+    beliefs, lawful, distant, rests = TRUST[number]
     present = x[NEXT + ANSWERS[number][1]]
-    last = latest[1](x) if latest else math.nan
-    values = value, guess, regression, last, present
-    able = sum(1 << k for k, each in enumerate(values[:4]) if math.isfinite(each))
+    values = value, guess, regression, math.nan, present
+    able = sum(1 << k for k, each in enumerate(values[:3]) if math.isfinite(each))
     winner = -mode if lawful else mode
     lead = 0
     if margin > 0.0:
@@ -847,8 +844,6 @@ def settled(number, said, outcome, mode, margin, x, odds):
         outcome = UNSURE if outcome == PREDICTED else outcome
     elif outcome == UNEXPLAINED and winner:
         outcome = PREDICTED
-    if EXPERTS[speaker] == "latest" and winner:
-        mode = latest[0]
     return values[speaker], outcome, mode, (probability, interval)
 
 '''

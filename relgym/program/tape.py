@@ -152,7 +152,7 @@ def space_of(most: Sizes) -> np.dtype[np.void]:
         ("given", np.int64, (answers,)),
         ("given_values", np.float64, (answers,)),
         ("touched", np.int64, (answers,)),  # whom a mover touches; or the mode that gave a value
-        # What the winner, the guess, both regressions and the mode that held last say of each answer; NaN: nothing.
+        # What the winner, the guess and both regressions say of each answer, and what no program knows; NaN: nothing.
         ("experts", np.float64, (answers, 4)),
         ("fitted", np.int64, (1,)),  # what regressions look at lies in `shown`; 0: nothing does
         ("shown", np.float64, (2, most.shown)),  # that, and how far from what they know
@@ -184,8 +184,6 @@ class Tape:
     votes
         Of every answer that is voted for, in order: where the votes of each contest begin in the code, and where its
         modes stand in the order in which they win ties.
-    latest
-        Of every answer, where in the code it stands which mode held last, and where each mode stands.
     reaches
         Of every answer, where among the numbers bounds of regressions' changes stand, and how far they are trusted; -1:
         there are none.
@@ -195,7 +193,6 @@ class Tape:
     numbers: NDArray[np.float64]
     sizes: Sizes
     votes: tuple[tuple[tuple[int, ...], int], ...] = ()
-    latest: tuple[tuple[int, dict[int, int]], ...] = ()
     reaches: tuple[int, ...] = ()
 
     def space(self) -> NDArray[np.void]:
@@ -252,7 +249,6 @@ class _Writer:
         self.variables = 1
         self.reads: set[int] = set()
         self.votes: list[tuple[tuple[int, ...], int]] = []
-        self.latest: list[tuple[int, dict[int, int]]] = []
         self.reaches: list[int] = []
         self.fits: list[int] = []
         self.spreads: dict[ir.Leverage, int] = {}
@@ -308,7 +304,6 @@ class _Writer:
             np.array(self.numbers),
             self._sizes(),
             tuple(self.votes),
-            tuple(self.latest),
             tuple(self.reaches),
         )
 
@@ -527,13 +522,7 @@ class _Writer:
         lists = [self.put(len(v), *v) for v in (list(a.needs), features, modes, stops)]
         at_follows = self.put(len(a.follows), *follows)
         state = ("modes", "lost", "none").index(a.state)
-        latest = 0 if a.trust is None else a.trust.latest
-        places = {
-            mode.id: at
-            for mode, at in zip(a.modes, modes, strict=True)
-            if mode.function is not None and not mode.roles
-        }
-        at = self.put(
+        return self.put(
             a.column,  # 0
             a.key,
             a.body,
@@ -561,10 +550,7 @@ class _Writer:
             int(a.vote is not None and _narrow(a.vote)),
             self._trust(a.trust),  # 25
             self._regression(a.regression),
-            places.get(latest, 0),
         )
-        self.latest.append((at + 27, places))
-        return at
 
     def _trust(self, trust: ir.Trust | None) -> int:
         """Beliefs in the order of their kinds' numbers: kinds, who speaks and whether that is claimed, and how sure."""

@@ -61,6 +61,10 @@ class SceneLayout:
     names: tuple[str, ...]
     types: tuple[ObjectType, ...]
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What is kept beside these is worked out again: it names other layouts, and those would name others.
+        return {"names": self.names, "types": self.types}
+
     @cached_property
     def offsets(self) -> tuple[int, ...]:
         """Where each object's property vector starts."""

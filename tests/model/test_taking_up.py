@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
@@ -17,6 +18,7 @@ from relgym.errors import ObservationError
 from relgym.experiments.bodies.worlds import Setting, body_rooms
 from relgym.model.files.archive import parts_to_arrays, parts_to_json
 from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.calibration import LATEST
 from relgym.model.predicting.motion import Laws
 from relgym.model.predicting.prediction import LateAudit
 from relgym.model.predicting.prequential import StepReport, compared
@@ -204,19 +206,49 @@ def test_a_late_audit_of_what_is_no_target_any_more_is_none() -> None:
     assert [p.audit for p in said.parts] == [None]
 
 
-def test_a_step_that_changes_who_held_last_is_more_than_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = WorldModel(BOX, targets=[SPEED])
-    learned(model, steps(3_000))
-    monkeypatch.setattr(PropertyModel, "asks_latest", property(lambda _: True))
-    known, changed = model.property_model("cart", "v"), 0
-    for step in steps(300, seed=3):
-        before = known.latest
-        (report,) = learned(model, [step])
-        assert report.learned is not None
-        if known.latest != before:
-            changed += 1
-            assert not report.learned.counted
-    assert changed > 20
+def gusty(count: int, seed: int = 0) -> Iterator[Transition]:
+    """A kite that rises or falls as the wind goes, which nothing shows, and which turns every 40 steps or so."""
+    schema, rng = SceneSchema((ObjectType("kite", ("h",)),), (("k", "kite"),)), np.random.default_rng(seed)
+    h, wind = 1.0, 1.0
+    before = schema.scene({"k": [h]})
+    for _ in range(count):
+        wind = -wind if rng.random() < 1.0 / 40.0 else wind
+        h = 0.9 * h + wind
+        before, last = schema.scene({"k": [h]}), before
+        yield Transition(last, before)
+
+
+def test_what_held_last_is_asked_of_what_follows_alone(tmp_path: Path) -> None:
+    some = list(gusty(2_000))
+    model = WorldModel(some[0].before.schema, targets=[Target("kite", "h")])
+    learned(model, some)
+    before, now = some[-1].before, some[-1].after
+    wind = now["k"]["h"] - 0.9 * before["k"]["h"]
+    told = model.predict_one(now)[("k", "h")]
+    assert told.audit.speaker == LATEST
+    assert told.value == pytest.approx(0.9 * now["k"]["h"] + wind)
+    # Of any other scene it isn't known how the wind goes.
+    other = now.schema.scene({"k": [now["k"]["h"] + 0.125]})
+    assert math.isnan(model.predict_one(other)[("k", "h")].audit.values[LATEST])
+    vectors = np.stack([other.vector, now.vector, other.vector])
+    model.save(tmp_path / "kite.json.gz", history=True)
+    for same in (model, WorldModel.load(tmp_path / "kite.json.gz"), copy.deepcopy(model)):
+        one_by_one = [same.predict_one(scene) for scene in (other, now, other)]
+        for _ in range(3):  # arrays, then a program
+            many = same.predict_batch(now.layout, vectors)
+            for k, one in enumerate(one_by_one):
+                assert one.scene.vector.tobytes() == many.vectors[k].tobytes()
+                part = one[("k", "h")]
+                assert (part.mode, part.probability) == (many.modes[k, 0], many.probabilities[k, 0])
+            same.predict_batch(now.layout, np.repeat(vectors, 2_000, axis=0))
+        rolled = same.rollout_batch(now.layout, vectors, 3)
+        for k, scene in enumerate((other, now, other)):
+            along = [step for step in same.rollout(scene, 3) if step.ok]
+            assert rolled.lasted[k] == len(along)
+            last = along[-1].scene if along else scene
+            assert rolled.vectors[k].tobytes() == last.vector.tobytes()
+    model.learn_one(Transition(now, other))  # it goes on from there
+    assert math.isnan(model.predict_one(now)[("k", "h")].audit.values[LATEST])
 
 
 def test_modes_have_the_shares_of_what_came_that_they_have_where_all_is_learned_from() -> None:

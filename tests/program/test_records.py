@@ -87,7 +87,7 @@ def test_least_squares_by_hand() -> None:
     squares = ir.Regression(0, 0, weights, -3.0, 3.0, trusted)
     beliefs = tuple(ir.Belief(1, 0, -2, able, 2, 0.75, 0.125, True) for able in (0, 4))
     answer = ir.Answer(
-        "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False, 0), regression=squares
+        "o", "p0", 0, 0, (), -1, state="none", trust=ir.Trust(beliefs, False), regression=squares
     )
     program = empty(3, 9, answers=(answer,), fits=(ir.Fit(columns, leverage),))
     said = by_source(python_source(program, "", SENTENCES), np.array([[10.0, 4.0, 1.0]]))

@@ -269,11 +269,8 @@ def _trusted(
     regressed: tuple[float, float],
 ) -> tuple[float, int, int, tuple[float, float]]:
     value, outcome, mode, margin, guess = said
-    functions = {m.id: m.function for m in a.modes}
-    function = functions.get(trust.latest)
-    latest = math.nan if function is None else _sum(function, x)
     regression, far = regressed
-    values = dict(zip(ir.EXPERTS, (value, guess, regression, latest, x[width + a.column]), strict=True))
+    values = dict(zip(ir.EXPERTS, (value, guess, regression, math.nan, x[width + a.column]), strict=True))
     able = sum(1 << k for k, e in enumerate(ir.EXPERTS[:4]) if math.isfinite(values[e]))
     kind = PREDICTED if mode else outcome
     # Bins of leads: below 1/2, 1, 2, 4, 8, and more; 0: none, 7: nobody else was in it.
@@ -290,8 +287,6 @@ def _trusted(
         outcome = UNSURE
     elif outcome == UNEXPLAINED and b.claimed and mode:
         outcome = PREDICTED
-    if ir.EXPERTS[b.speaker] == "latest" and mode:
-        mode = trust.latest
     return values[ir.EXPERTS[b.speaker]], outcome, mode, (b.probability, b.interval)
 
 
@@ -423,12 +418,9 @@ class _Maker:
             a = replace(a, reach=reach, clipped=self.coin())
         if state == "modes":
             a = self.modes(a, able)
-        elif self.coin():  # it isn't asked, but may be the one that held last
-            a = replace(a, modes=(ir.Mode(9, self.register(), self.sum(able)),))
         if self.fits and self.coin():
             a = replace(a, regression=self.regression(column))
-        bound = [mode.id for mode in a.modes if mode.function is not None]
-        return replace(a, trust=self.trust(a, rng.choice([0, *bound]))) if trusting else a
+        return replace(a, trust=self.trust(a)) if trusting else a
 
     def fit(self) -> ir.Fit:
         """What one or two regressions look at."""
@@ -489,15 +481,13 @@ class _Maker:
             return ir.Landing(6, value, place, self.small(), self.rng.choice((0.0, 0.25)))
         return ir.Stop(5, value, place, self.small(), self.small(), self.rng.choice((-1.0, 1.0)))
 
-    def trust(self, a: ir.Answer, latest: int) -> ir.Trust:
+    def trust(self, a: ir.Answer) -> ir.Trust:
         """Something about every kind of predictions, and more about some of them."""
         rng = self.rng
         able = [
             bits
-            for bits in range(16)
-            if (a.guess or a.beyond or not bits & 2)
-            and (latest or not bits & 8)
-            and (a.regression or not bits & 4)
+            for bits in range(8)
+            if (a.guess or a.beyond or not bits & 2) and (a.regression or not bits & 4)
         ]
         kinds = [(outcome, who, -2) for outcome in range(6) for who in (-1, 0, 1)]
         winners = [*(mode.id for mode in a.modes), 5, 7]
@@ -506,7 +496,7 @@ class _Maker:
         beliefs = []
         for outcome, winner, lead in kinds:
             for bits in able:
-                speaker = rng.choice([*(k for k in range(4) if bits >> k & 1), 4])
+                speaker = rng.choice([*(k for k in range(3) if bits >> k & 1), 4])
                 sure, width = rng.choice((math.nan, 0.5, 0.99)), rng.randint(1, 99) / 8.0
                 beliefs.append(ir.Belief(outcome, winner, lead, bits, speaker, sure, width, self.coin()))
-        return ir.Trust(tuple(beliefs), False, latest, a.regression is not None and self.coin())
+        return ir.Trust(tuple(beliefs), False, a.regression is not None and self.coin())

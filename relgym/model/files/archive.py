@@ -12,6 +12,7 @@ from relgym.errors import ModelFileError
 from relgym.files.reading import check_depth
 from relgym.model.files.storage import schema_from_json, schema_to_json, target_from_json, target_to_json
 from relgym.model.parts import Parts
+from relgym.model.percepts.scenes import Arrival
 
 __all__ = ["parts_from_json", "parts_to_arrays", "parts_to_json"]
 
@@ -35,6 +36,7 @@ def parts_to_json(parts: Parts, *, history: bool) -> dict[str, Any]:
         **({"saved_cells": parts.agenda.saved} if history else {}),
         "tables": [parts.tables[name].to_json() for name in sorted(parts.tables)] if history else [],
         "laws": None if parts.laws is None else parts.laws.to_json(history=history),
+        **({} if parts.arrival is None else {"arrival": parts.arrival.to_json()}),
         **({"screen": parts.screen.to_json()} if history else {}),
         "regressions": {
             name: regression.to_json(history=history)
@@ -104,6 +106,8 @@ def parts_from_json(
         parts.agenda.saved = body.saved_cells
     if "screen" in data:
         parts.screen.restore(data["screen"])
+    if "arrival" in data:
+        parts.arrival = Arrival.from_json(data["arrival"], {t.name: t for t in parts.schema.types})
     if parts.laws is not None:
         parts.laws.restore(data["laws"], _of(arrays, "laws."))
         parts.laws.mark(parts.models)

@@ -126,6 +126,12 @@ def check_body(body: Body, parts: Parts, arrays: _Arrays | None) -> None:
     )
     for k, (part, target) in enumerate(zip(body.targets, targets, strict=True)):
         _TargetCheck(parts, target, f"targets[{k}].model", arrays is not None).check(part.model)
+    if body.arrival is not None:
+        types = {t.name: t for t in parts.schema.types}
+        _distinct([name for name, _ in body.arrival.objects], "arrival")
+        _require(all(kind in types for _, kind in body.arrival.objects), "arrival", "no such type")
+        width = sum(len(types[kind].properties) for _, kind in body.arrival.objects)
+        _require(len(body.arrival.values) == width, "arrival", f"expected {width} numbers")
     known = {str(target) for target in targets}
     for name, hindsight in body.hindsight.items():
         _require(name in known, "hindsight", f"{name!r} is no target")

@@ -415,6 +415,8 @@ class PropertyRecord(Record):
     limits: LimitsRecord = field(default_factory=LimitsRecord)
     candidates: CandidatesRecord | None = None
     stops: StopsRecord = field(default_factory=StopsRecord)
+    places: list[tuple[ModeId, list[list[Count]]]] = []
+    """Of modes with roles that relations can't describe: slots of these with which all examples agree."""
     past: list[ModeId] = []
     amended: list[ModeId] = []
     latest: ModeOrNoise = 0
@@ -695,6 +697,13 @@ class ScreenRecord(Record):
     ]
 
 
+class ArrivalRecord(Record):
+    """The scene that the latest transition came to: its objects' names and types, and their numbers in this order."""
+
+    objects: Annotated[list[Pair], Meta(min_length=1)]
+    values: list[Finite]
+
+
 class Body(Record):
     """All that a model file says, but for the arrays of its history."""
 
@@ -710,6 +719,7 @@ class Body(Record):
     looks: list[tuple[Name, Name, bool]] = []
     saved_cells: Whole | None = None
     screen: ScreenRecord | None = None
+    arrival: ArrivalRecord | None = None
     hindsight: dict[str, HindsightRecord] = {}
     calibration: dict[str, CalibrationRecord] = {}
     regressions: dict[str, RegressionRecord] = {}

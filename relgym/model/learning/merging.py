@@ -134,7 +134,7 @@ def _take_up(
     mine.start_over(table)
     mine.hindsight = mine.hindsight.united(theirs.hindsight)
     mine.calibration = mine.calibration.united(theirs.calibration)
-    mine.calibration.reliable = mine.reliable
+    mine.vouch()
 
 
 def _exemplars(

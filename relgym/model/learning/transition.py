@@ -105,13 +105,12 @@ def learn(
         _go_on(parts, budget)
     searches = _for_searches(budget)
     rows = {name: table.seen for name, table in parts.tables.items()}
-    moved = False
     for type_name in parts.by_type:
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
-                moved |= _learn_object(parts, percept, index, following, reports, searches, confirmed)
+                _learn_object(parts, percept, index, following, reports, searches, confirmed)
     for target in found:  # behind the change: of what is always the same hardly a function is verified
         table = parts.tables[target.type]
         recall(parts, target, len(table) - table.seen + rows.get(target.type, 0), searches)
@@ -130,7 +129,7 @@ def learn(
         work = _refresh(parts, budget)
         parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
         parts.idle = not budget.spent and _nothing_waits(parts)
-    counted = not (reports or moved or heard or budget.spent or found)
+    counted = not (reports or heard or budget.spent or found)
     return LearnReport(reports, work, counted=counted)
 
 
@@ -221,25 +220,21 @@ def _learn_object(
     reports: dict[tuple[str, str], ClusterReport],
     budget: Budget,
     confirmed: Mapping[tuple[str, str], Confirmed],
-) -> bool:
-    """Learn from one object; whether what others stand for changed what is said (`PropertyModel.latest`)."""
+) -> None:
+    """Learn from one object."""
     layout = percept.layout
     name = layout.names[index]
     type_name = layout.types[index].name
     weights: dict[str, int] = {}
-    moved = False
     for target, model in parts.by_type[type_name]:
         one = confirmed.get((name, target.property))
         if one is None or one.weight:
             weights[target.property] = 1 if one is None else one.weight
             continue
-        before = model.latest
-        asked = before != one.mode and model.asks_latest
         if not model.take_for_known(one.mode):
             weights[target.property] = 1
-        moved |= model.latest != before and (asked or model.asks_latest)
     if not weights:
-        return moved
+        return
     situation = percept.situation(index)
     table = parts.tables[type_name]
     x = percept.rows(index, following[None])[0]
@@ -261,7 +256,6 @@ def _learn_object(
     if rough and parts.regressions[type_name].learn_one(situation.signature, x, changes):
         _tell_regressed(parts, type_name)
         budget.spend(parts.regressions[type_name].solving_cells)
-    return moved
 
 
 def _tell_regressed(parts: Parts, type_name: str) -> None:

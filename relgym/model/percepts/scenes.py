@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from relgym.arguments import refusing
 from relgym.config.constants import LAYOUTS
 from relgym.errors import ObservationError
-from relgym.scene.objects import ACTION, Scene, SceneLayout
+from relgym.scene.objects import ACTION, TASK, ObjectType, Scene, SceneLayout
 from relgym.scene.schema import SceneSchema
 
 __all__ = [
+    "Arrival",
     "Passage",
     "angle_columns",
     "mismatch",
@@ -102,6 +104,59 @@ def mismatch(schema: SceneSchema, known: SceneSchema) -> str:
         if t != types[t.name]:
             return f"type {t.name!r} has another shape, parent, pose or velocity"
     return ""
+
+
+class Arrival:
+    """The scene that the latest transition came to, which the next one begins with.
+
+    Parameters
+    ----------
+    layout, vector
+        Its layout, and its numbers.
+    """
+
+    __slots__ = ("_sought", "layout", "vector")
+
+    def __init__(self, layout: SceneLayout, vector: NDArray[np.float64]) -> None:
+        self.layout, self.vector = layout, vector
+        self._sought: tuple[SceneLayout, NDArray[np.intp], NDArray[np.float64]] | None = None
+
+    def __reduce__(self) -> tuple[type[Arrival], tuple[SceneLayout, NDArray[np.float64]]]:
+        return Arrival, (self.layout, self.vector)
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON representation."""
+        names = zip(self.layout.names, (t.name for t in self.layout.types), strict=True)
+        return {"objects": [list(pair) for pair in names], "values": self.vector.tolist()}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any], types: Mapping[str, ObjectType]) -> Arrival:
+        """The scene that `to_json` wrote, of types by their names."""
+        names, kinds = zip(*data["objects"], strict=True)
+        return cls(SceneLayout(names, tuple(types[kind] for kind in kinds)), np.array(data["values"]))
+
+    def rows(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.intp]:
+        """Which of n scenes hold its numbers, but for what is done there and what a task says, ascending."""
+        if self._sought is None or self._sought[0] is not layout:
+            sought, way = np.full(layout.width, np.nan), passage(layout, self.layout)
+            sought[way.columns] = self.vector[way.sources]  # NaN: what isn't there equals nothing
+            columns = _observed(layout)
+            self._sought = layout, columns, sought[columns]
+        _, columns, sought = self._sought
+        if not len(columns):
+            return columns
+        rows = np.flatnonzero(vectors[:, columns[0]] == sought[0])
+        return rows[(vectors[np.ix_(rows, columns)] == sought).all(axis=1)] if len(rows) else rows
+
+
+def _observed(layout: SceneLayout) -> NDArray[np.intp]:
+    """Columns of a state vector that are neither of an action nor of a task; cached on the layout."""
+    found: NDArray[np.intp] | None = layout.__dict__.get("_observed_columns")
+    if found is None:
+        there = [i for i, t in enumerate(layout.types) if t.name not in (ACTION, TASK)]
+        places = [column for i in there for column in range(layout.width)[layout.slice(i)]]
+        found = layout.__dict__["_observed_columns"] = np.array(places, dtype=np.intp)
+    return found
 
 
 def angle_columns(layout: SceneLayout) -> NDArray[np.intp]:

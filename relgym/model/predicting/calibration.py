@@ -9,8 +9,9 @@ approximation how far from what it was made of it is asked; in those of its winn
   `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984), and who does in all cells together where
   it doesn't trail by as many. A law that can be claimed keeps the word where it is hardly worse;
 - the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
-  laws, said of changes with this outcome; and until the first miss a mode or law may be one that is always right. A hit
-  is off by no more than `ModelConfig.claim_error` of what mostly changes;
+  laws, said of changes with this outcome; and until the first miss a mode or law may be one that is always right, the
+  likelier the more examples an only mode explains. A hit is off by no more than `ModelConfig.claim_error` of what
+  mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
 Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
@@ -267,6 +268,11 @@ class _Record:
         """Posterior mean of the share of hits; the prior has the given mean and counts for one trial, as Jeffreys'."""
         return (self.hits + prior) / (self.trials + 1.0)
 
+    def filled(self, prior: float) -> float:
+        """The same of who makes no claims: what lacks for many trials is as the prior says."""
+        short = max(FEW - self.trials, 1.0)
+        return (self.hits + short * prior) / (self.trials + short)
+
     def share_of(self, speaker: int, prior: float, bits: float = 0.0) -> float:
         """`share` of an expert's values; that what held last goes on is a guess at what is hidden, and no law."""
         return self.mean(prior) if speaker == LATEST else self.share(prior, bits)
@@ -479,6 +485,7 @@ class Calibration:
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
         self._reliable: frozenset[int] | None = None
+        self._proven = 0
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
@@ -513,6 +520,17 @@ class Calibration:
     def reliable(self, modes: frozenset[int] | None) -> None:
         if modes != self._reliable:
             self._reliable = modes
+            self._changed()
+
+    @property
+    def proven(self) -> int:
+        """Bits by which examples speak for a mode that is the only one and explains them all; 0 where there is none."""
+        return self._proven
+
+    @proven.setter
+    def proven(self, bits: int) -> None:
+        if bits != self._proven:
+            self._proven = bits
             self._changed()
 
     @property
@@ -585,6 +603,10 @@ class Calibration:
         families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
         rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] * nowhere, nowhere)) for each in families]
         rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
+        untried = [
+            Key(0, mode, OF_WINNER) for mode in sorted(self._reliable or ())
+        ]  # of whom others may vouch
+        rows += [(k, k._replace(lead=nowhere)) for k in untried if k not in self._cells]
         kinds = {k for k in self._cells if k.lead >= 0}
         if distant:
             of = [k for k in self._cells if k.lead == OF_WINNER and k.winner > 0]
@@ -618,18 +640,28 @@ class Calibration:
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
             speaker, known = self._anywhere(able, PERSISTENCE), [trusted]
-        latest = next((c for c in (cell, winner) if c is not None and speaker in c.records), None)
-        said = _Record() if latest is None else latest.records[speaker]
-        prior, bits = _mean(family, speaker), bits if speaker == OWN else 0.0
-        share = said.share_of(speaker, prior, bits) if self.trials else math.nan
-        if latest is not None and speaker == OWN:
-            share = min(share, latest.credit(prior, bits))
+        share = self._right(key, speaker, _mean(family, speaker)) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         record = trusted.records.get(speaker)
         half = math.nan if record is None else _interval(record.errors)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
+
+    def _right(self, key: Key, speaker: int, prior: float) -> float:
+        """How probably who speaks of a prediction is right; the prior is that of its family."""
+        _, winner, cell = (self._cells.get(each) for each in _levels(key))
+        heard = [c for c in (winner, cell) if c is not None and speaker in c.records]
+        if not _makes_claims(speaker):
+            # In a cell of few trials those lacking are as those of its winner, and of that as those of its family.
+            share = prior if key.winner else _mean(self._whole(), speaker)
+            for each in heard if key.winner else heard[:1]:  # without a winner they are one
+                share = each.records[speaker].filled(share)
+            return share
+        bits = self._bits(_who(key)) if speaker == OWN else 0.0
+        said = heard[-1].records[speaker] if heard else _Record()
+        share = said.share_of(speaker, prior, bits)
+        return min(share, heard[-1].credit(prior, bits)) if heard and speaker == OWN else share
 
     def _far_out(self, key: Key) -> bool:
         """Whether an approximation that was asked before is asked far from what it was made of."""
@@ -737,7 +769,7 @@ class Calibration:
         return 0.0
 
     def _bits(self, who: int) -> float:
-        return self._vouched if who < 0 else 0.0
+        return self._vouched if who < 0 else float(self._proven) if who > 0 else 0.0
 
     def vouch(self, bits: float) -> None:
         """Laws come in force, which describe what came in so many bits less than modes: so much likelier they are."""

@@ -224,6 +224,24 @@ def _overruled(
     return Audit(key, values, OWN)
 
 
+def latest_values(
+    parts: Parts, model: PropertyModel, percept: Percept, index: int, following: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
+
+    NaN where its roles are open, and of all scenes but those that follow the latest transition: what decides which mode
+    holds may be hidden, and of other scenes it would tell nothing.
+    """
+    if parts.arrival is None or not model.asks_latest:
+        return None
+    rows = parts.arrival.rows(percept.layout, percept.vectors)
+    if not len(rows):
+        return None
+    found = np.full(len(following), np.nan)
+    found[rows] = model.latest_values(percept, index, following)[rows]
+    return found
+
+
 def _experts_one(
     parts: Parts,
     target: Target,
@@ -245,7 +263,7 @@ def _experts_one(
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
     if lawful:
         return tuple(found)
-    latest = model.latest_values(percept, index, following[None])
+    latest = latest_values(parts, model, percept, index, following[None])
     found[LATEST] = math.nan if latest is None else float(latest[0])
     changes = parts.regressed(percept, index, target.property) if model.asks_regressions else None
     if changes is not None:
@@ -280,7 +298,7 @@ def _experts(
     guessed = model.fallback.guessed(percept, index, following) if model.fallback.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
-    latest = None if parts.governs(target) else model.latest_values(percept, index, following)
+    latest = None if parts.governs(target) else latest_values(parts, model, percept, index, following)
     if latest is not None:
         found[:, LATEST] = np.where(np.isfinite(latest), latest, np.nan)
     if model.asks_regressions and not parts.governs(target):

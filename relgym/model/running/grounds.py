@@ -10,7 +10,6 @@ from __future__ import annotations
 from operator import is_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from relgym.clustering.mode import NOISE
 from relgym.model.target.property_model import PropertyModel
 
 if TYPE_CHECKING:
@@ -80,11 +79,12 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
     )
     if not votes:
         return
-    numbers += (model.undecided, model.lost, model.latest if model.lost else NOISE)
+    numbers += (model.undecided, model.lost)
     if len(classifier.modes) > 1 and not model.lost:
         familiar = classifier._familiarity()
         things.append(familiar)
         numbers.append(len(familiar.seen))  # of which none is ever forgotten
+    numbers.append(tuple(sorted(model.functions.places.items())) if model.functions.places else ())
     for mode, cast in model.casting.classifiers.items():
         numbers += (mode, cast.errors > 0)
         for d in cast.descriptions:

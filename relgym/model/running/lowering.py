@@ -19,7 +19,7 @@ from relgym.classification.role_classifier import RoleClassifier
 from relgym.classification.roles import _log_odds
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode as LearnedMode
-from relgym.clustering.roles import Binding, bind
+from relgym.clustering.roles import Binding
 from relgym.config.constants import TOLD
 from relgym.laws.book import LawBook
 from relgym.laws.frames import FRAMES, POINT, axis_names
@@ -280,10 +280,7 @@ class _Lowering:
         """What an answer by modes says besides."""
         ids = model.classifier.modes
         if model.lost or not ids:
-            latest = [model.latest] if model.latest in ids else []  # it may be asked all the same
-            bound = [m for m in latest if not _open(bind(model.mode(m), situation.signature))]
-            found = tuple(self._mode(model, number, situation, one, body) for number in bound)
-            return {"state": "lost" if model.lost else "none", "modes": found}
+            return {"state": "lost" if model.lost else "none", "modes": ()}
         signature = situation.signature
         found = tuple(self._mode(model, number, situation, one, body) for number in ids)
         registers = {mode.id: mode.register for mode in found}
@@ -378,7 +375,7 @@ class _Lowering:
     ) -> ir.Mode:
         mode = model.mode(number)
         signature, layout = situation.signature, self.layout
-        binding = bind(mode, signature)
+        binding = model.functions.binding(signature, number)
         register = self.register()
         if binding is None:
             return ir.Mode(number, register, None)
@@ -592,10 +589,6 @@ def _bound_sum(
         return None
     terms = [(ir.CONSTANT, float(binding.intercept))]
     return ir.Sum((*terms, *((column(c), float(w)) for c, w in binding.fixed)))
-
-
-def _open(binding: Binding | None) -> bool:
-    return binding is None or bool(binding.open)
 
 
 def _piece(piece: Piece, where: Mapping[str, int]) -> ir.Sum:

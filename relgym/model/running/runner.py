@@ -32,7 +32,7 @@ from relgym.model.predicting.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.predicting.querying import Odds, Said, derive, settled
+from relgym.model.predicting.querying import Odds, Said, derive, latest_values, settled
 from relgym.model.predicting.regression import Regression
 from relgym.model.running.compiled import KERNEL
 from relgym.model.running.grounds import Grounds
@@ -105,12 +105,13 @@ class Programs:
             return None
         if (runner := self.of(parts, scene.layout, 1)) is None:
             return None
-        if (said := runner.sure(scene)) is not None:
+        resumes = bool(len(parts.resumed(scene.layout, scene.vector[None])))
+        if not resumes and (said := runner.sure(scene)) is not None:
             return said
         if self._resting:
             self._resting -= 1
             return None
-        said = runner.argued(scene, percept(scene))
+        said = runner.argued(scene, percept(scene), resumes=resumes)
         self._declined = self._resting = 0 if said is not None else min(2 * self._declined + 1, REPAID)
         return said
 
@@ -236,13 +237,13 @@ class Runner:
     def _lay(self, tape: Tape) -> None:
         """Take note of where what changes often stands in the tape that is run, and write what holds now."""
         self._sizes = tape.sizes
-        self._places, self._latest = tape.votes, tape.latest
+        self._places = tape.votes
         self._regressions = self._reaches_at(tape.reaches)
         self._votes = [None for places, _ in tape.votes for _ in places]
         self.follow()
 
     def follow(self) -> None:
-        """Write what changes often into the program: votes, the mode that held last, how far regressions reach.
+        """Write what changes often into the program: votes, and how far regressions reach.
 
         All else that it says is as it was. How right its predictions are is written anew when somebody asks for many.
         """
@@ -259,10 +260,6 @@ class Runner:
             code[by_tie : by_tie + len(first)] = first
         if moved:
             self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
-        for teller, (place, modes) in zip(self._tellers, self._latest, strict=True):
-            if modes:
-                model = teller.model
-                code[place] = modes.get(model.latest, 0) if model.asks_latest else 0
         for known in self._regressions:
             if known.seen != known.regression.seen:
                 known.seen = known.regression.seen
@@ -383,12 +380,13 @@ class Runner:
         self._asked += 1
         return self._settled and self._believing
 
-    def argued(self, scene: Scene, percept: Percept) -> ScenePrediction | None:
+    def argued(self, scene: Scene, percept: Percept, *, resumes: bool = False) -> ScenePrediction | None:
         """Predict what follows one scene; None where the program can't tell it.
 
         What the program says is what arrays would have said of modes and laws; whose value counts is settled here as
         there (`relgym.model.predicting.querying.settled`). Where that is another one than the program's own, and other
-        answers need it, the program says what follows from it. The percept is for what isn't asked of the program.
+        answers need it, the program says what follows from it. The percept is for what isn't asked of the program, such
+        as what the mode says that held last; `resumes` tells whether it is to be asked.
         """
         now, given = scene.vector, dict[int, tuple[int, float]]()
         numbers: list[float] = now.tolist()
@@ -407,6 +405,10 @@ class Runner:
                 return None
             model, lawful = teller.model, a.component >= 0
             others = None if model.candidates else teller.values(said, numbers)
+            if others is not None and resumes and not lawful:
+                latest = latest_values(parts, model, percept, teller.index, following[None])
+                if latest is not None and math.isfinite(latest[0]):
+                    others = (*others[:LATEST], float(latest[0]), *others[LATEST + 1 :])
             away = far[k] if far[k] and raw.mode and not lawful and model.tells_how_far else 0
             known = raw, odds, others, away, teller.relied_on
             one = settled(parts, model, percept, teller.index, following, *known, lawful=lawful)
@@ -450,8 +452,6 @@ class Runner:
                 return None
             values = teller.values(experts, numbers)
             roles, own, frame = teller.known(numbers, mode, noted, players)
-            if speaker == LATEST and mode:
-                roles = roles[:1]
             if speaker != OWN:
                 own = math.nan if speaker == PERSISTENCE else spread
             key = kinds.get(believed[0])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from relgym.model.parts import Parts
-from relgym.model.predicting.calibration import GUESS, LATEST, OWN, REGRESSION
+from relgym.model.predicting.calibration import GUESS, OWN, REGRESSION
 from relgym.model.predicting.prediction import OUTCOMES, Outcome
 from relgym.model.target.property_model import PropertyModel
 from relgym.program import records as ir
@@ -44,9 +44,8 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
             continue
         if model.candidates:
             raise ir.BeyondError("laws of hypothesis classes that were added")
-        latest = _latest(model, a)
         guessed = a.guess is not None or a.beyond is not None
-        having = ((OWN, True), (GUESS, guessed), (REGRESSION, a.regression is not None), (LATEST, latest))
+        having = ((OWN, True), (GUESS, guessed), (REGRESSION, a.regression is not None))
         able = sum(1 << expert for expert, has in having if has)
         key = layout.types[index].name, a.property
         if key not in beliefs:
@@ -54,7 +53,7 @@ def trusting(parts: Parts, layout: SceneLayout, program: ir.Program) -> ir.Progr
         distant = model.tells_how_far and a.regression is not None
         relied_on = parts.relied_on(model)
         rests = tuple(number for pair, number in keys.items() if pair in relied_on and number in a.needs)
-        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, latest, distant, rests)))
+        answers.append(replace(a, trust=ir.Trust(beliefs[key], a.component >= 0, distant, rests)))
     return replace(program, answers=tuple(answers))
 
 
@@ -65,11 +64,3 @@ def _beliefs(model: PropertyModel, able: int) -> list[ir.Belief]:
         ir.Belief(*key, bits, told.speaker, told.probability, told.interval, claimed, told.spread)
         for key, bits, told, claimed in model.record.table(KINDS, some, distant=model.tells_how_far)
     ]
-
-
-def _latest(model: PropertyModel, a: ir.Answer) -> int:
-    """The mode that held last, if it is asked; 0 where it isn't, or some role of it is open."""
-    if a.component >= 0 or not model.asks_latest:
-        return 0
-    known = next((mode for mode in a.modes if mode.id == model.latest), None)
-    return 0 if known is None or known.function is None or known.roles else known.id

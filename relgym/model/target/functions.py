@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config import ModelConfig
+from relgym.config.constants import SEARCHED_CELLS
 from relgym.model.target.casting import Casting
 from relgym.scene.objects import SceneLayout
 
@@ -44,11 +46,16 @@ class BoundFunctions:
     def __getstate__(self) -> dict[str, Any]:
         return {"_known": {}}  # keyed by identity, which a copy doesn't share
 
-    def of(self, signature: SlotSignature, number: int, mode: Mode) -> Binding | None:
-        """A function over a signature's columns, asked for by number; None where its roles have no objects."""
+    def of(
+        self, signature: SlotSignature, number: int, mode: Mode, places: tuple[int, ...] = ()
+    ) -> Binding | None:
+        """A function over a signature's columns, asked for by number; None where its roles have no objects.
+
+        `places`: as for `bind`.
+        """
         known = self._known.get((id(signature), number))
         if known is None or known[0] is not mode:
-            known = self._known[id(signature), number] = (mode, bind(mode, signature))
+            known = self._known[id(signature), number] = (mode, bind(mode, signature, places))
         return known[1]
 
     def clear(self) -> None:
@@ -65,6 +72,13 @@ class ModeFunctions:
         Knows the modes and binds objects to their roles.
     config
         Free parameters.
+
+    Attributes
+    ----------
+    places
+        Of modes with roles that several objects without a body could play, and that no relation can describe
+        therefore: slots of the roles with which every example so far agrees. A single choice is taken: the first of
+        the other agents, say, always plays it.
     """
 
     def __init__(self, clusterer: ModeClusterer, casting: Casting, config: ModelConfig) -> None:
@@ -72,6 +86,7 @@ class ModeFunctions:
         self.clusterer = clusterer
         self.casting = casting
         self.bound = BoundFunctions()
+        self.places: dict[int, frozenset[tuple[int, ...]]] = {}
 
     def mode(self, number: int) -> Mode:
         """The mode of that id."""
@@ -90,7 +105,56 @@ class ModeFunctions:
 
     def binding(self, signature: SlotSignature, mode: int) -> Binding | None:
         """A mode's function over a signature's columns; None where its roles have no objects."""
-        return self.bound.of(signature, mode, self.mode(mode))
+        places = self.places.get(mode, frozenset())
+        return self.bound.of(signature, mode, self.mode(mode), next(iter(places)) if len(places) == 1 else ())
+
+    def find_places(self, table: ExampleTable) -> None:
+        """Find anew where those stand that are bound to roles which relations can't describe."""
+        clusterer = self.clusterer
+        self.places = {}
+        for number, cluster in clusterer.clusters.items():
+            roles = cluster.mode.open_roles
+            if not roles or any(role.type in self.casting.vocabulary.unary for role in roles):
+                continue
+            examples = np.flatnonzero(clusterer.labels == number)
+            if (found := self._agreed(table, number, examples)) is not None:
+                self.places[number] = found
+        self.bound.clear()
+
+    def confirm_places(self, table: ExampleTable, number: int, mode: int) -> None:
+        """Keep only those slots with which another example of a mode agrees, too."""
+        if (known := self.places.get(mode)) and (
+            found := self._agreed(table, mode, np.array([number]))
+        ) is not None:
+            self.places[mode] = known & found
+            if self.places[mode] != known:
+                self.bound.clear()
+
+    def places_to_json(self) -> list[Any]:
+        """Plain data."""
+        return [[mode, sorted(list(each) for each in found)] for mode, found in sorted(self.places.items())]
+
+    def restore_places(self, data: Iterable[Any]) -> None:
+        """Take over what `places_to_json` wrote."""
+        self.places = {int(mode): frozenset(map(tuple, found)) for mode, found in data}
+        self.bound.clear()
+
+    def _agreed(
+        self, table: ExampleTable, mode: int, examples: NDArray[np.intp]
+    ) -> frozenset[tuple[int, ...]] | None:
+        """Slots of a mode's roles with which all of some examples agree; None where there is no choice."""
+        clusterer, found = self.clusterer, None
+        signatures = table.signature_ids[clusterer.rows[examples]]
+        for number in np.unique(signatures):
+            binding = clusterer.clusters[mode].binding(table, int(number))
+            if binding is None or not binding.open:
+                continue
+            part = examples[signatures == number][-(SEARCHED_CELLS // len(binding.assignments)) :]
+            off = np.abs(binding.values(table.x[clusterer.rows[part]]) - clusterer.y[part][:, None])
+            agree = (off <= clusterer.scale.tolerance).all(axis=0)
+            here = frozenset(map(tuple, binding.slots[agree].tolist()))
+            found = here if found is None else found & here
+        return found
 
     def values(
         self, signature: SlotSignature, x: NDArray[np.float64], ids: tuple[int, ...]

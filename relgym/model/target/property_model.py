@@ -22,7 +22,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import FEWEST, LEFT_OPEN, MEMORY, RECENT, SEARCHED_CELLS
+from relgym.config.constants import EVIDENCE, FEWEST, LEFT_OPEN, MEMORY, RECENT, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, OWN, Assessment, Calibration, Key
@@ -203,12 +203,14 @@ class PropertyModel:
         if mode in self.limits:
             given, credit = self._credited(np.array([mode]), fits[None], values[None], self.classifier.modes)
             mode, fits = int(given[0]), credit[0]
+        if mode in self.functions.places:
+            self.functions.confirm_places(table, seen.row, mode)
         assigned = UNKNOWN if mode == NOISE or self.bounds(mode) else mode
         played = self.functions.played_one(table, seen.row, mode)
         self.classifier.observe(seen, assigned, fits, values, roles=played, weight=weight)
         if played:
             self.casting.observe(self.mode(mode), seen, played, weight)
-        self.calibration.reliable = self.reliable
+        self.vouch()
         return report
 
     def _of_now(self, report: ClusterReport) -> int:
@@ -300,6 +302,8 @@ class PropertyModel:
     def follow(self, table: ExampleTable, budget: Budget | None = None) -> None:
         """The modes changed from outside: classifiers follow at once, spreads as soon as the budget allows it."""
         self._follow(table)
+        if len(labels := self.clusterer.labels[-RECENT:]):
+            self._unsettled = _noisy(labels) > LEFT_OPEN
         self.fallback.unexplained = self._assess()
         self._unmeasured = True
         if budget is None or budget.left:
@@ -391,7 +395,7 @@ class PropertyModel:
             self.amended -= revised
             self.calibration.revise(revised)
         if spent:
-            self.calibration.reliable = self.reliable
+            self.vouch()
         return spent
 
     @property
@@ -406,6 +410,29 @@ class PropertyModel:
         return (
             frozenset(self.classifier.flawless - self.casting.flawed) if self.accounted_for else frozenset()
         )
+
+    @property
+    def proven(self) -> int:
+        """Bits by which examples speak for a mode that is the only one and explains all of them; 0 where none does.
+
+        No condition and no choice of players was made to suit them, and what they scatter by is as good as right. So of
+        n examples each is explained by what the others show: leave any of them out, and the function is the same. A
+        next one that isn't would be one in n. Of so few that this is less than `EVIDENCE` nothing is said.
+        """
+        known = self.clusterer
+        if len(self.classifier.modes) != 1 or known.approximate or known.noise_examples:
+            return 0
+        (only,) = self.classifier.modes
+        if 2.0 * self.mode(only).sigma > self.config.claim_error * self.calibration.change:
+            return 0
+        if self.casting.embodied(self.mode(only)) or len(self.functions.places.get(only, (0,))) != 1:
+            return 0
+        bits = known.seen.bit_length()
+        return bits if bits >= EVIDENCE else 0
+
+    def vouch(self) -> None:
+        """Tell what is known of predictions which modes are likely to be right, though they were never tried."""
+        self.calibration.reliable, self.calibration.proven = self.reliable, self.proven
 
     def reconsider(self, table: ExampleTable, budget: Budget) -> None:
         """Guess anew where nothing is explained, and ask for hypotheses, if it is time, as far as the budget goes."""
@@ -448,7 +475,7 @@ class PropertyModel:
 
     def _follow(self, table: ExampleTable) -> None:
         """The set of modes changed: what the classifiers remember is labelled anew."""
-        self.functions.bound.clear()
+        self.functions.find_places(table)
         self.fallback.bound.clear()
         before, self.limits = self.limits, find_limits(self.clusterer, table)
         self.stops = self._find_stops(table)
@@ -465,7 +492,7 @@ class PropertyModel:
         self.casting.sync({m.id: m for m in self.modes})
         self.functions.recast(table, self.classifier.exemplars)
         self.casting.recall(self.classifier.exemplars)
-        self.calibration.reliable = self.reliable
+        self.vouch()
 
     def _credited(
         self,
@@ -571,13 +598,8 @@ class PropertyModel:
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
-        """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
-
-        NaN where its roles are open.
-        """
-        if not self.asks_latest:
-            return None
+    ) -> NDArray[np.float64]:
+        """What the mode that held last says of one object of n scenes, shape ``(n,)``; NaN where its roles are open."""
         x = percept.rows(index, following, ordered=False)
         return self.functions.values(percept.situation(index).signature, x, (self.latest,))[:, 0]
 
@@ -839,6 +861,7 @@ class PropertyModel:
             **({"candidates": self.candidates.to_json()} if self.candidates else {}),
             "limits": self.limits.to_json(),
             "stops": self.stops.to_json(),
+            **({"places": self.functions.places_to_json()} if self.functions.places else {}),
             **({"past": sorted(self.past)} if self.past else {}),
             **({"amended": sorted(self.amended)} if self.amended else {}),
         }
@@ -865,7 +888,7 @@ class PropertyModel:
         self.stops = Stops.from_json(data.get("stops", {}))
         self.past = {int(mode) for mode in data.get("past", ())}
         self.amended = {int(mode) for mode in data.get("amended", ())}
-        self.functions.bound.clear()
+        self.functions.restore_places(data.get("places", ()))
         self.fallback.bound.clear()
 
 

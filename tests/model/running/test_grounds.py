@@ -408,5 +408,6 @@ def test_where_laws_govern_votes_are_not_read() -> None:
     parts = lawful_model()
     known = Grounds.of(parts)
     (governed, *_) = [m for t, m in parts.models.items() if parts.governs(t)]
-    governed.latest = 99
+    governed.hindsight = Hindsight([(1, 1)] * 200)
+    assert governed.undecided
     assert known.same(Grounds.of(parts))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -117,15 +118,15 @@ def test_programs_that_cannot_tell_rest() -> None:
         def sure(self, _: Scene) -> None:
             return None
 
-        def argued(self, *_: object) -> object:
+        def argued(self, *_: object, **__: object) -> object:
             asked.append(self.now)
             return "told" if 383 <= self.now < 386 else None
 
-    programs = running.Programs()
+    programs, parts = running.Programs(), SimpleNamespace(resumed=lambda *_: ())
     for now in range(400):
         programs.changed()
         programs.of = lambda *_, now=now: Runner(now)  # type: ignore[method-assign]
-        programs.one(None, scene, lambda _: None)  # type: ignore[arg-type, return-value]
+        programs.one(parts, scene, lambda _: None)  # type: ignore[arg-type, return-value]
     # Rests of 1, 3, 7, 15, 31, 63, 127, then 128; whoever can tell is asked each time, and rests shortly if he can't.
     assert asked == [0, 2, 6, 14, 30, 62, 126, 254, 383, 384, 385, 386, 388, 392]
 
@@ -180,9 +181,11 @@ def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.Monke
     argued: list[Scene] = []
     whole = running.Runner.argued
 
-    def noted(self: running.Runner, scene: Scene, percept: Percept) -> ScenePrediction | None:
+    def noted(
+        self: running.Runner, scene: Scene, percept: Percept, *, resumes: bool = False
+    ) -> ScenePrediction | None:
         argued.append(scene)
-        return whole(self, scene, percept)
+        return whole(self, scene, percept, resumes=resumes)
 
     monkeypatch.setattr(running.Runner, "argued", noted)
     for _ in range(6):
