@@ -835,7 +835,8 @@ class WorldModel:
 
         Its ``step(vector)`` predicts one scene, ``predict(vectors)`` many: next state vectors, outcomes (by the order
         of `Outcome`), modes, margins, probabilities and intervals, as `predict_batch` does. Every mode, law, choice
-        between two modes and description of a role is a function of its own.
+        between two modes and description of a role is a function of its own. Only the mode that held last, which the
+        model asks of the scene that follows the latest transition, isn't asked.
 
         Parameters
         ----------

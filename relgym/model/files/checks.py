@@ -412,6 +412,12 @@ class _TargetCheck:
         where = f"{self.where}.limits, stops or past"
         for mode in model.amended:
             _require(mode in ids, f"{self.where}.amended", f"there is no mode {mode}")
+        others = {mode.id: len(mode.roles) - 1 for mode in model.clusterer.modes}
+        _distinct([mode for mode, _ in model.places], f"{self.where}.places")
+        for mode, found in model.places:
+            _require(mode in ids, f"{self.where}.places", f"there is no mode {mode}")
+            whole = all(len(slots) == others[mode] for slots in found)
+            _require(whole, f"{self.where}.places", f"expected slots of {others[mode]} roles")
         for mode in (*(bound[0] for bound in limits), *(each.mode for each in every), *model.past):
             _require(mode in ids, where, f"there is no mode {mode}")
             _require(mode not in voting, where, f"mode {mode} takes part in the vote")

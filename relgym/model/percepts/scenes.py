@@ -137,12 +137,13 @@ class Arrival:
 
     def rows(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.intp]:
         """Which of n scenes hold its numbers, but for what is done there and what a task says, ascending."""
-        if self._sought is None or self._sought[0] is not layout:
-            sought, way = np.full(layout.width, np.nan), passage(layout, self.layout)
-            sought[way.columns] = self.vector[way.sources]  # NaN: what isn't there equals nothing
-            columns = _observed(layout)
-            self._sought = layout, columns, sought[columns]
-        _, columns, sought = self._sought
+        known = self._sought
+        if known is None or known[0] is not layout:
+            whole, way = np.full(layout.width, np.nan), passage(layout, self.layout)
+            whole[way.columns] = self.vector[way.sources]  # NaN: what isn't there equals nothing
+            places = _observed(layout)
+            known = self._sought = layout, places, whole[places]
+        _, columns, sought = known
         if not len(columns):
             return columns
         rows = np.flatnonzero(vectors[:, columns[0]] == sought[0])

@@ -249,6 +249,20 @@ DAMAGES: dict[str, tuple[str, Change, str]] = {
         lambda b, a: _target(b)["clusterer"]["random"].update(bit_generator="MT19937"),
         "bit_generator",
     ),
+    "places of no mode": (
+        "truck", lambda b, a: _target(b).update(places=[[99, [[1]]]]), "there is no mode 99"
+    ),
+    "places of too few roles": (
+        "truck",
+        lambda b, a: _target(b).update(places=[[_target(b)["clusterer"]["modes"][0]["id"], [[1] * 9]]]),
+        "expected slots of",
+    ),
+    "a scene of another type": (
+        "truck", lambda b, a: b.update(arrival={"objects": [["a", "none"]], "values": [0.0]}), "no such type"
+    ),
+    "a scene of too many numbers": (
+        "truck", lambda b, a: b.update(arrival={"objects": [["a", "truck"]], "values": [0.0] * 99}), "numbers"
+    ),
     "extra that is nested too deep": ("truck", lambda b, a: b.update(extra={"a": _deep(64)}), "at most 64 levels"),
 }  # fmt: skip
 
