@@ -131,7 +131,7 @@ class Binding:
 def bind(mode: Mode, signature: SlotSignature, played: tuple[int, ...] = ()) -> Binding | None:
     """Lay a mode over a signature; None when some role has no object or column that could play it.
 
-    `played`: slot of every role but the target's, if it is known where they always stand.
+    `played`: of every role but the target's, which of the slots of its type plays it, if that is always the same.
     """
     by_type = signature.slots_by_type
     if not signature.offers(prop for prop, _ in mode.roles[0].terms):
@@ -145,7 +145,7 @@ def bind(mode: Mode, signature: SlotSignature, played: tuple[int, ...] = ()) -> 
         # Next values of a type are columns only where they were asked for, or where an object is alone of its type.
         if len(slots) < wanted or not all(signature.has(s, prop) for s in slots for prop, _ in role.terms):
             return None
-        slots = slots if not played or played[k] not in slots else (played[k],)
+        slots = slots if not played or played[k] >= len(slots) else (slots[played[k]],)
         if len(slots) == 1:
             forced.append(slots[0])
             fixed += [(signature.column(slots[0], prop), weight) for prop, weight in role.terms]

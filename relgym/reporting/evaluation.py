@@ -425,6 +425,13 @@ def _cast(
     roles = [r for r in part.roles if set(r.labels) & set(owners)]
     numbers: dict[str, _Floats] = {}
     players: dict[str, NDArray[np.int64]] = {}
+    for role in [role for role in roles if role.place]:
+        others = [i for i in layout.of_type(role.type) if i != index]
+        for prop in scenes.schema.type(role.type).properties if role.place <= len(others) else ():
+            column = layout.column(others[role.place - 1], prop)
+            numbers[f"{role.labels[0]}.{prop}"] = scenes.vectors[:, column]
+            numbers[f"{role.labels[0]}.{prop}'"] = scenes.following[:, column]
+    roles = [role for role in roles if not role.place]
     if not roles:
         return numbers, players
     levels = [_levels(scenes, index, role) for role in roles]

@@ -32,6 +32,7 @@ _COUNT = re.compile(r"(\S+) × (\d+)(?: to (\d+))?")
 _TARGET = re.compile(r"(?P<type>[^\s.]+)\.(?P<property>\S+)'  \((?P<steps>[\d,]+) steps?\)")
 _STEPS = re.compile(r"([\d,]+) steps?")
 _UNEXPLAINED = re.compile(r"([\d,]+) of these steps \(.*\) follow none of these functions")
+_PLACE = re.compile(r"number (\d+) of the other objects of type (.+)")
 _BOUND = re.compile(r"then (at least|at most) (\S+?)(?:  \(([\d,]+) steps?\))?")
 _IF = re.compile(r"then if (.*): (\S+?)(?:  \(([\d,]+) steps?\))?")
 _WITHIN = re.compile(r"the change within (\S+) and (\S+)")
@@ -265,6 +266,8 @@ def _rest(draft: _Draft, text: str) -> bool:
         name, said = (part.strip() for part in text.split(" := ", 1))
         if said.startswith("any "):
             draft.roles.append(RuleRole(tuple(name.split(", ")), said.removeprefix("any ")))
+        elif match := _PLACE.fullmatch(said):
+            draft.roles.append(RuleRole((name,), match[2], place=whole_of(match[1])))
         elif said.startswith("the ") and " B where " in said:
             kind, rules = said.removeprefix("the ").split(" B where ", 1)
             alternatives = _cases(rules, arity=2)

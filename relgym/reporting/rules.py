@@ -125,11 +125,14 @@ class RuleRole:
         The objects' type.
     alternatives
         Conditions of A and such an object B, the surest first; none: any object of the type.
+    place
+        Number of the object among the others of its type, in the scene's order; 0: it isn't told by that.
     """
 
     labels: tuple[str, ...]
     type: str
     alternatives: tuple[Condition, ...] = ()
+    place: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +280,12 @@ class PropertyRules:
             "bounds": [bound_text(bound, digits=digits).removeprefix("then ") for bound in self.bounds],
             "ended": list(self.ended),
             "roles": [
-                {"names": [*role.labels], "type": role.type, "if": [*map(condition_text, role.alternatives)]}
+                {
+                    "names": [*role.labels],
+                    "type": role.type,
+                    "if": [*map(condition_text, role.alternatives)],
+                    "place": role.place or None,
+                }
                 for role in self.roles
             ],
             "situations": None if self.experience is None else len(self.experience.seen),
@@ -536,6 +544,9 @@ def _role_lines(roles: Iterable[RuleRole]) -> list[str]:
     lines = []
     for role in roles:
         names = ", ".join(role.labels)
+        if role.place:
+            lines.append(f"  {names} := number {role.place} of the other objects of type {role.type}")
+            continue
         if not role.alternatives:
             lines.append(f"  {names} := any {role.type}")
             continue

@@ -416,7 +416,8 @@ class PropertyRecord(Record):
     candidates: CandidatesRecord | None = None
     stops: StopsRecord = field(default_factory=StopsRecord)
     places: list[tuple[ModeId, list[list[Count]]]] = []
-    """Of modes with roles that relations can't describe: slots of these with which all examples agree."""
+    """Of modes with roles that relations can't describe: numbers of the players among the others of their types, with
+    which all examples agree."""
     past: list[ModeId] = []
     amended: list[ModeId] = []
     latest: ModeOrNoise = 0

@@ -225,4 +225,7 @@ def _role_rows(part: PropertyModel) -> tuple[RoleRow, ...]:
         for kind, labels in alike.items():
             rule = "" if rules.get(kind) is None else str(rules[kind])
             rows.append(RoleRow(mode.id, kind.type, tuple(labels), rule))
+        placed = zip(mode.role_labels()[1:], mode.open_roles, part.functions.place(mode.id), strict=False)
+        for label, role, number in placed:
+            rows.append(RoleRow(mode.id, role.type, (label,), "", number + 1))
     return tuple(rows)

@@ -301,6 +301,13 @@ def _labels(
     labels = list(mode.role_labels())
     described = part.casting.classifiers.get(mode.id)
     rules = {d.kind: d.definition for d in described.descriptions} if described is not None else {}
+    for place, (role, number) in enumerate(
+        zip(mode.open_roles, part.functions.place(mode.id), strict=False), 1
+    ):
+        of = role.type, number + 1, ()
+        if of not in known:
+            known[of] = RuleRole((f"{role.type}_{next(letters)}",), role.type, place=number + 1)
+        labels[place] = known[of].labels[0]
     embodied = [role in part.casting.embodied(mode) for role in mode.roles[1:]]
     kinds: dict[RoleKind, list[int]] = {}
     for place, (role, body) in enumerate(zip(mode.roles[1:], embodied, strict=True), start=1):

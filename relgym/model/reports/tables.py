@@ -100,12 +100,15 @@ class RoleRow:
         What the function calls the objects; several where they are interchangeable.
     rule
         What must hold of such an object B, A being the target; empty if any object of the type will do.
+    place
+        Number of the object among the others of its type, in the scene's order; 0: it isn't told by that.
     """
 
     mode: int
     type: str
     roles: tuple[str, ...]
     rule: str
+    place: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,6 +235,7 @@ def _role_table(roles: tuple[RoleRow, ...]) -> str:
     rows: list[list[Cell]] = []
     for r in roles:
         who = f"a {r.type} B with {r.rule}" if r.rule else f"any {r.type}"
+        who = f"number {r.place} of the other objects of type {r.type}" if r.place else who
         rows.append([r.mode, ", ".join(r.roles), who])
     return table(["mode", "role", "bound to"], rows)
 

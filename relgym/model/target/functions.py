@@ -77,8 +77,8 @@ class ModeFunctions:
     ----------
     places
         Of modes with roles that several objects without a body could play, and that no relation can describe
-        therefore: slots of the roles with which every example so far agrees. A single choice is taken: the first of
-        the other agents, say, always plays it.
+        therefore: numbers of the players among the others of their types, with which every example so far agrees. A
+        single choice is taken: the first of the other agents, say, is always bound to it.
     """
 
     def __init__(self, clusterer: ModeClusterer, casting: Casting, config: ModelConfig) -> None:
@@ -105,8 +105,12 @@ class ModeFunctions:
 
     def binding(self, signature: SlotSignature, mode: int) -> Binding | None:
         """A mode's function over a signature's columns; None where its roles have no objects."""
+        return self.bound.of(signature, mode, self.mode(mode), self.place(mode))
+
+    def place(self, mode: int) -> tuple[int, ...]:
+        """Number of the player of each role of a mode but the target's, where that is always the same; else nothing."""
         places = self.places.get(mode, frozenset())
-        return self.bound.of(signature, mode, self.mode(mode), next(iter(places)) if len(places) == 1 else ())
+        return next(iter(places)) if len(places) == 1 else ()
 
     def find_places(self, table: ExampleTable) -> None:
         """Find anew where those stand that are bound to roles which relations can't describe."""
@@ -122,7 +126,7 @@ class ModeFunctions:
         self.bound.clear()
 
     def confirm_places(self, table: ExampleTable, number: int, mode: int) -> None:
-        """Keep only those slots with which another example of a mode agrees, too."""
+        """Keep only those places with which another example of a mode agrees, too."""
         if (known := self.places.get(mode)) and (
             found := self._agreed(table, mode, np.array([number]))
         ) is not None:
@@ -142,8 +146,9 @@ class ModeFunctions:
     def _agreed(
         self, table: ExampleTable, mode: int, examples: NDArray[np.intp]
     ) -> frozenset[tuple[int, ...]] | None:
-        """Slots of a mode's roles with which all of some examples agree; None where there is no choice."""
+        """Numbers of the players with which all of some examples of a mode agree; None where there is no choice."""
         clusterer, found = self.clusterer, None
+        kinds = [role.type for role in clusterer.clusters[mode].mode.open_roles]
         signatures = table.signature_ids[clusterer.rows[examples]]
         for number in np.unique(signatures):
             binding = clusterer.clusters[mode].binding(table, int(number))
@@ -152,7 +157,11 @@ class ModeFunctions:
             part = examples[signatures == number][-(SEARCHED_CELLS // len(binding.assignments)) :]
             off = np.abs(binding.values(table.x[clusterer.rows[part]]) - clusterer.y[part][:, None])
             agree = (off <= clusterer.scale.tolerance).all(axis=0)
-            here = frozenset(map(tuple, binding.slots[agree].tolist()))
+            alike = [binding.signature.slots_by_type[kind] for kind in kinds]
+            here = frozenset(
+                tuple(among.index(slot) for among, slot in zip(alike, slots, strict=True))
+                for slots in binding.slots[agree].tolist()
+            )
             found = here if found is None else found & here
         return found
 

@@ -13,6 +13,7 @@ from relgym.clustering.mode import NOISE
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.world_model import WorldModel
+from relgym.reporting.parser import parse_rules
 from relgym.scene.objects import ObjectType, Scene, Target, Transition
 from relgym.scene.schema import SceneSchema
 
@@ -48,6 +49,9 @@ def test_a_role_is_bound_to_who_always_stands_at_the_same_place(tmp_path: Path) 
     assert [mode.formula() for mode in model.modes("agent", "gap")] == [
         "gap' = -0.25 v + gap + 0.25 agent_a.v"
     ]
+    text, bound = model.rules().text(17), "number 2 of the other objects of type agent"
+    assert f"agent_a := {bound}" in text
+    assert bound in model.describe(details=True)
     (step,) = walks(1, SECOND, seed=1)
     model.save(tmp_path / "team.json.gz", history=True)
     for same in (model, WorldModel.load(tmp_path / "team.json.gz"), copy.deepcopy(model)):
@@ -60,6 +64,8 @@ def test_a_role_is_bound_to_who_always_stands_at_the_same_place(tmp_path: Path) 
             assert told.value == pytest.approx(step.after[name]["gap"], abs=1e-12)
             assert (many.vectors[:, 2 * k + 1] == told.value).all()
             assert (many.probabilities[:, k] == told.probability).all()
+            for rules in (parse_rules(text), same.rules()):
+                assert rules.predict(step.before)[name, "gap"] == pytest.approx(told.value, abs=1e-12)
 
 
 def test_who_stands_elsewhere_for_each_isnt_told_by_places() -> None:
