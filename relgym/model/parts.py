@@ -176,6 +176,10 @@ class Parts:
             m.asks_latest for t, m in self.models.items() if not self.governs(t)
         )
 
+    def resumes(self, layout: SceneLayout, vector: NDArray[np.float64]) -> bool:
+        """Whether the mode that held last is asked of a scene."""
+        return self.arrival is not None and self.arrival.begins(layout, vector) and self.recalls
+
     def resumed(self, layout: SceneLayout, vectors: NDArray[np.float64]) -> NDArray[np.intp]:
         """Of which of n scenes the mode that held last is asked, ascending."""
         rows = np.empty(0, dtype=np.intp) if self.arrival is None else self.arrival.rows(layout, vectors)

@@ -105,7 +105,7 @@ class Programs:
             return None
         if (runner := self.of(parts, scene.layout, 1)) is None:
             return None
-        resumes = bool(len(parts.resumed(scene.layout, scene.vector[None])))
+        resumes = parts.resumes(scene.layout, scene.vector)
         if not resumes and (said := runner.sure(scene)) is not None:
             return said
         if self._resting:

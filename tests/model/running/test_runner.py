@@ -122,7 +122,7 @@ def test_programs_that_cannot_tell_rest() -> None:
             asked.append(self.now)
             return "told" if 383 <= self.now < 386 else None
 
-    programs, parts = running.Programs(), SimpleNamespace(resumed=lambda *_: ())
+    programs, parts = running.Programs(), SimpleNamespace(resumes=lambda *_: False)
     for now in range(400):
         programs.changed()
         programs.of = lambda *_, now=now: Runner(now)  # type: ignore[method-assign]
