@@ -494,6 +494,7 @@ class CalibrationRecord(Record):
     vouched: Weight
     changes: Bins
     cells: list[CellRecord]
+    proven: Count = 0
 
 
 class LeverageRecord(Record):

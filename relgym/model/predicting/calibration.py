@@ -603,10 +603,9 @@ class Calibration:
         families = [(outcome, who) for outcome in range(outcomes) for who in (-1, 0, 1)]
         rows = [(Key(*each, OF_FAMILY), Key(each[0], each[1] * nowhere, nowhere)) for each in families]
         rows += [(k, k._replace(lead=nowhere)) for k in sorted(self._cells) if k.lead == OF_WINNER]
-        untried = [
-            Key(0, mode, OF_WINNER) for mode in sorted(self._reliable or ())
-        ]  # of whom others may vouch
-        rows += [(k, k._replace(lead=nowhere)) for k in untried if k not in self._cells]
+        # Modes that nobody tried yet, and others may vouch for.
+        untried = {Key(0, mode, OF_WINNER) for mode in self._reliable or ()} - self._cells.keys()
+        rows += [(k, k._replace(lead=nowhere)) for k in sorted(untried)]
         kinds = {k for k in self._cells if k.lead >= 0}
         if distant:
             of = [k for k in self._cells if k.lead == OF_WINNER and k.winner > 0]
@@ -1064,6 +1063,7 @@ class Calibration:
             "trials": self.trials,
             "slips": list(self._slips),
             "vouched": self._vouched,
+            **({"proven": self._proven} if self._proven else {}),
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
             "cells": [
                 {
@@ -1104,6 +1104,7 @@ class Calibration:
         found.trials = int(data["trials"])
         found._slips = [float(each) for each in data["slips"]]
         found._vouched = float(data["vouched"])
+        found._proven = int(data.get("proven", 0))
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         for each in data["cells"]:
             records = {

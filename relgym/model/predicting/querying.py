@@ -40,7 +40,7 @@ from relgym.program.records import VALUED
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Odds", "Said", "derive", "predict", "predict_many", "settled"]
+__all__ = ["Odds", "Said", "derive", "latest_values", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)

@@ -338,4 +338,4 @@ def restore_calibration(parts: Parts, data: Mapping[str, Any]) -> None:
                 parts.config.claim_slips,
                 len(parts.config.hypotheses),
             )
-            model.vouch()
+            model.calibration.reliable = model.reliable

@@ -417,7 +417,8 @@ class PropertyModel:
 
         No condition and no choice of players was made to suit them, and what they scatter by is as good as right. So of
         n examples each is explained by what the others show: leave any of them out, and the function is the same. A
-        next one that isn't would be one in n. Of so few that this is less than `EVIDENCE` nothing is said.
+        next one that isn't would be one in n or more: log2 n bits, whole ones, of which fewer than `EVIDENCE` say
+        nothing.
         """
         known = self.clusterer
         if len(self.classifier.modes) != 1 or known.approximate or known.noise_examples:
@@ -427,7 +428,7 @@ class PropertyModel:
             return 0
         if self.casting.embodied(self.mode(only)) or len(self.functions.places.get(only, (0,))) != 1:
             return 0
-        bits = known.seen.bit_length()
+        bits = known.seen.bit_length() - 1
         return bits if bits >= EVIDENCE else 0
 
     def vouch(self) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from relgym.clustering.mode import NOISE
 from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.predicting.calibration import Calibration
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.world_model import WorldModel
 from relgym.reporting.parser import parse_rules
@@ -78,13 +79,15 @@ def test_who_stands_elsewhere_for_each_isnt_told_by_places() -> None:
 
 def test_an_only_mode_that_explains_all_is_proven() -> None:
     model = learned(SECOND, 20)  # what properties mostly change by is known then
-    for step in walks(300, SECOND, seed=1):
+    for step in walks(600, SECOND, seed=1):
         assert model.property_model("agent", "gap").proven == 0
         model.learn_one(step)
-        if model.property_model("agent", "gap").clusterer.seen >= 1 << 9:
+        if model.property_model("agent", "gap").clusterer.seen >= 1 << 10:
             break
     part = model.property_model("agent", "gap")
-    assert part.proven == part.calibration.proven == 10  # of 512 examples, a power of two
+    assert part.proven == part.calibration.proven == 10  # of 1,024 examples
+    again = Calibration.from_json(part.calibration.to_json(), 0.5)
+    assert again.proven == 10  # as it was told, not as it would be told now
     part.clusterer.labels[-1] = NOISE  # one that it doesn't explain
     assert part.proven == 0
 
