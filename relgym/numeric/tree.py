@@ -27,6 +27,7 @@ _DEFAULT = ClassificationConfig()
 
 _Float1D: TypeAlias = NDArray[np.float64]
 _Float2D: TypeAlias = NDArray[np.float64]
+_Weights: TypeAlias = NDArray[np.float64] | NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +183,15 @@ def learn_tree(
             "a tree needs as many classes and weights as rows and a name per column; "
             f"got x of shape {x.shape}, {len(positive)} classes, {len(weights)} weights, {len(names)} names"
         )
-    grower = _Grower(x, np.asarray(positive, dtype=np.bool_), weights, min_leaf, max_depth)
-    root = yield from grower.grow(np.arange(len(x)), 0)
+    whole = weights.sum() <= x.size and np.array_equal(weights, weights.astype(np.intp))
+    grower = _Grower(
+        np.ascontiguousarray(x.T),
+        np.asarray(positive, dtype=np.bool_),
+        weights.astype(np.intp) if whole else weights,
+        min_leaf,
+        max_depth,
+    )
+    root = yield from grower.grow(np.arange(len(x)), grower.order(), 0)
     if prune:
         root, _ = _pruned(root, x.shape[1])
     nodes: list[_Node] = []
@@ -212,90 +220,117 @@ class _Node:
 
 @dataclass(frozen=True, slots=True)
 class _Grower:
-    x: _Float2D
+    x: _Float2D  # by column, of shape (d, n)
     positive: NDArray[np.bool_]
-    weights: _Float1D
+    weights: _Weights  # whole numbers where all are, if few
     min_leaf: int
     max_depth: int
 
-    def grow(self, rows: NDArray[np.intp], depth: int) -> Steps[_Node]:
+    def order(self) -> NDArray[np.intp]:
+        """All rows by value, of each column. NaN last: undefined values lie above every cut."""
+        return np.argsort(self.x, axis=1, kind="stable")
+
+    def grow(self, rows: NDArray[np.intp], order: NDArray[np.intp], depth: int) -> Steps[_Node]:
+        """The tree of some rows, which are in `order` by value of each column: sorted once, and parted at each node."""
         weights, classes = self.weights[rows], self.positive[rows]
         node = _Node(float(weights[classes].sum()), float(weights[~classes].sum()))
         if depth == self.max_depth or not (classes.any() and not classes.all()):
             return node
-        best, cuts = self._best_split(rows)
-        # Each column is sorted, and summed up on either side of all cuts.
-        yield self.x.shape[1] * (CALL + 2 * len(rows) * len(rows).bit_length())
+        best, node.cuts = self._best_split(order)
+        # Each column is gone through, and summed up on either side of all cuts.
+        yield len(self.x) * (CALL + 2 * len(rows) * len(rows).bit_length())
         if best is None:
             return node
         _, _, node.column, node.threshold = best
-        node.cuts = cuts
-        below = self.x[rows, node.column] <= node.threshold
-        lower = yield from self.grow(rows[below], depth + 1)
-        node.children = lower, (yield from self.grow(rows[~below], depth + 1))
+        below = self.x[node.column] <= node.threshold
+        children = []
+        for side in (below, ~below):
+            part = rows[side[rows]]
+            children.append(
+                (yield from self.grow(part, order[side[order]].reshape(len(order), -1), depth + 1))
+            )
+        node.children = children[0], children[1]
         return node
 
-    def _best_split(self, rows: NDArray[np.intp]) -> tuple[tuple[float, float, int, float] | None, int]:
+    def _best_split(self, order: NDArray[np.intp]) -> tuple[tuple[float, float, int, float] | None, int]:
         """(entropy, -relative gap, column, threshold) of the best split, and how many cuts were tried."""
         best: tuple[float, float, int, float] | None = None
-        cuts, width = 0, max(1, CACHED // len(rows))
-        for first in range(0, self.x.shape[1], width):
-            entropies, gaps, thresholds, counts = self._cuts(rows, slice(first, first + width))
-            cuts += int(counts.sum())
-            for k in np.flatnonzero(counts).tolist():
-                among = entropies[k]
-                near = np.flatnonzero(among <= among.min() + ROUNDED)
-                pick = near[np.argmax(gaps[k, near])]
-                entropy, gap = float(among[pick]), float(gaps[k, pick])
-                closer = best is None or entropy < best[0] - ROUNDED
-                if closer or (best is not None and entropy <= best[0] + ROUNDED and -gap < best[1]):
-                    best = entropy, -gap, first + k, float(thresholds[k, pick])
+        cuts, width = 0, max(1, CACHED // order.shape[1])
+        for first in range(0, len(order), width):
+            columns = slice(first, first + width)
+            values = np.take_along_axis(self.x[columns], order[columns], axis=1)
+            may = self._may(values)
+            cuts += int(np.count_nonzero(may))
+            entropies = np.where(may, self._entropies(order[columns]), np.inf)
+            least = entropies.min(axis=1, initial=np.inf)
+            leading = least <= np.minimum.accumulate(least) + ROUNDED
+            for k in np.flatnonzero(leading & np.isfinite(least)).tolist():
+                if best is not None and least[k] > best[0] + ROUNDED:
+                    continue
+                near = np.flatnonzero(entropies[k] <= least[k] + ROUNDED)
+                gaps, thresholds = _gaps(values[k], near)
+                pick = int(np.argmax(gaps))
+                entropy, gap = float(entropies[k, near[pick]]), float(gaps[pick])
+                if best is None or entropy < best[0] - ROUNDED or -gap < best[1]:
+                    best = entropy, -gap, first + k, float(thresholds[pick])
         return best, cuts
 
-    def _cuts(
-        self, rows: NDArray[np.intp], columns: slice
-    ) -> tuple[_Float2D, _Float2D, _Float2D, NDArray[np.intp]]:
-        """Of each column, between every two rows by value: entropy after, relative gap and threshold of a cut there.
-
-        Entropy is infinite where there may be none. And how many there may be.
-        """
-        n = len(rows)
-        values = np.ascontiguousarray(self.x[rows, columns].T)
-        order = np.argsort(values, axis=1, kind="stable")  # NaN last: undefined values lie above every cut
-        values = np.take_along_axis(values, order, axis=1)
-        weights = self.weights[rows][order]
-        hits = np.where(self.positive[rows][order], weights, 0.0)
+    def _may(self, values: _Float2D) -> NDArray[np.bool_]:
+        """Between which neighbours of sorted values, of shape ``(d, n)``, there may be a cut."""
+        n = values.shape[1]
+        place = np.arange(n - 1)
         finite = np.isfinite(values).sum(axis=1, keepdims=True)
-        lower, higher, place = values[:, :-1], values[:, 1:], np.arange(n - 1)
         with np.errstate(invalid="ignore"):  # what isn't finite is cut off below
-            step = higher - lower
             known = np.where(np.arange(n) < finite, np.abs(values), 0.0)
-            same = ROUNDED * known.max(axis=1, keepdims=True)
-            may = (step > same) & (place >= self.min_leaf - 1) & (place < n - self.min_leaf)
+            may: NDArray[np.bool_] = np.diff(values, axis=1) > ROUNDED * known.max(axis=1, keepdims=True)
+        may &= (place >= self.min_leaf - 1) & (place < n - self.min_leaf)
+        if (finite < n).any():
             may &= place < finite - 1
             # "Is it defined at all?"
             some = (finite > 0) & (finite < n) & (finite >= self.min_leaf) & (n - finite >= self.min_leaf)
             may |= some & (place == finite - 1)
-            upper = np.where(place + 1 < finite, higher, lower)
-            span = np.take_along_axis(values, np.maximum(finite - 1, 0), axis=1) - values[:, :1]
-            middle = lower + (upper - lower) / 2
-            # Rounding must not move the midpoint onto the upper value, or the test would change sides.
-            thresholds = np.where(middle < upper, middle, lower)
-            gaps = (upper - lower) / np.where(span != 0.0, span, 1.0)
-        below, hit = np.cumsum(weights, axis=1)[:, :-1], np.cumsum(hits, axis=1)[:, :-1]
-        every, all_hits = weights.sum(axis=1, keepdims=True), hits.sum(axis=1, keepdims=True)
-        after = _entropy(hit, below - hit)
-        after += _entropy(all_hits - hit, (every - below) - (all_hits - hit))
-        return np.where(may, after, np.inf), gaps, thresholds, may.sum(axis=1)
+        return may
+
+    def _entropies(self, order: NDArray[np.intp]) -> _Float2D:
+        """Total entropy in bits after a cut between any neighbours of sorted rows, of shape ``(d, n)``."""
+        hit = np.cumsum(np.where(self.positive, self.weights, 0)[order], axis=1)
+        if self.weights.min() == self.weights.max() == 1:
+            weight = np.arange(1, order.shape[1] + 1)[None]
+        else:
+            weight = np.cumsum(self.weights[order], axis=1)
+        left: _Float2D = _both(weight) - _both(hit) - _both(weight - hit)
+        return left
 
 
-def _entropy(positive: _Float1D, negative: _Float1D) -> _Float1D:
-    """Total entropy in bits of groups with these weights: sum of ``-w log2(share)``."""
-    total = np.maximum(positive + negative, float(np.finfo(np.float64).tiny))
-    parts = [np.maximum(part, 0.0) for part in (positive, negative)]
-    bits = [-part * np.log2(np.where(part > 0, part / total, 1.0)) for part in parts]
-    total_bits: _Float1D = bits[0] + bits[1]
-    return total_bits
+def _both(weight: _Weights) -> _Float2D:
+    """Sum of w log2 w of the weights on either side of all cuts, by cumulative sums of shape ``(d, n)``.
+
+    Whole numbers are looked up.
+    """
+    below, above = weight[:, :-1], weight[:, -1:] - weight[:, :-1]
+    if weight.dtype == np.intp:
+        known = _x_log_x(np.arange(int(weight[:, -1].max()) + 1.0))
+        both: _Float2D = known[below] + known[above]
+        return both
+    return _x_log_x(below.astype(np.float64)) + _x_log_x(np.maximum(above, 0.0, dtype=np.float64))
+
+
+def _x_log_x(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    found: NDArray[np.float64] = x * np.log2(np.where(x > 0.0, x, 1.0))
+    return found
+
+
+def _gaps(values: _Float1D, near: NDArray[np.intp]) -> tuple[_Float1D, _Float1D]:
+    """Of cuts behind these places of a sorted column: gaps relative to its range, and thresholds."""
+    finite = int(np.isfinite(values).sum())
+    lower, higher = values[near], values[near + 1]
+    upper = np.where(near + 1 < finite, higher, lower)
+    with np.errstate(invalid="ignore"):  # a value may be infinite
+        span = float(values[max(finite - 1, 0)] - values[0])
+        middle = lower + (upper - lower) / 2
+        gaps = (upper - lower) / (span or 1.0)
+    # Rounding must not move the midpoint onto the upper value, or the test would change sides.
+    return gaps, np.where(middle < upper, middle, lower)
 
 
 def _pruned(node: _Node, columns: int) -> tuple[_Node, float]:

@@ -368,7 +368,7 @@ class _Cell:
 
     @classmethod
     def united(cls, cells: Sequence[_Cell], experts: int) -> _Cell:
-        """What some cells know together, of whoever spoke in one of them; runs have no order then."""
+        """What some cells know together, of whoever spoke in one of them, but for errors; runs have no order then."""
         found = cls.new(PERSISTENCE, experts)
         for cell in cells:
             for sums, more in zip(found.squares, cell.squares, strict=True):
@@ -377,8 +377,6 @@ class _Cell:
                 known = found.records.setdefault(expert, _Record())
                 known.trials += record.trials
                 known.hits += record.hits
-                for place, count in record.errors.items():
-                    known.errors[place] = known.errors.get(place, 0.0) + count
         return found
 
     def credit(self, prior: float, bits: float) -> float:
@@ -642,8 +640,7 @@ class Calibration:
         share = self._right(key, speaker, _mean(family, speaker)) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
-        record = trusted.records.get(speaker)
-        half = math.nan if record is None else _interval(record.errors)
+        half = self._half(trusted, speaker)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
 
@@ -697,11 +694,18 @@ class Calibration:
             return False
         return _Record().share(_mean(family, OWN), bits) > self.probability
 
+    def _half(self, trusted: _Cell, speaker: int) -> float:
+        """Half width of the interval of an expert's values, by a cell that is trusted."""
+        cells = self._all_cells() if trusted is self._united else [trusted]
+        return _interval([c.records[speaker].errors for c in cells if speaker in c.records])
+
+    def _all_cells(self) -> list[_Cell]:
+        return [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _beside(OF_ALL)]
+
     def _whole(self) -> _Cell:
         """What all cells know together."""
         if self._united is None:
-            cells = [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _beside(OF_ALL)]
-            self._united = _Cell.united(cells, self.experts)
+            self._united = _Cell.united(self._all_cells(), self.experts)
             if (known := self._cells.get(_beside(OF_REGRESSION))) is not None:
                 for expert in (REGRESSION, PERSISTENCE):
                     self._united.squares[expert] = max(known.squares[expert], self._united.squares[expert])
@@ -1205,8 +1209,15 @@ def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, fl
     return {k: 0.5 * v for k, v in bins.items() if v > 1.0 / MEMORY}
 
 
-def _interval(bins: Mapping[int, float]) -> float:
-    """Half width of the interval that `COVERED` of what comes lies in; NaN where even the largest error can't tell."""
+def _interval(cells: Sequence[Mapping[int, float]]) -> float:
+    """Half width of the interval that `COVERED` of what comes lies in; NaN where even the largest error can't tell.
+
+    By the bins of errors of all cells together.
+    """
+    bins: dict[int, float] = {}
+    for each in cells:
+        for place, count in each.items():
+            bins[place] = bins.get(place, 0.0) + count
     count = sum(bins.values())
     return _quantile(bins, COVERED) if count >= COVERED * (count + 1.0) else math.nan
 
