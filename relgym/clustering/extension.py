@@ -24,7 +24,13 @@ from relgym.config.constants import ENOUGH, EVIDENCE, EXACT, LITTLE, MOST_ROWS, 
 from relgym.numeric.ransac import Consensus
 from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
 
-__all__ = ["extended", "is_flag"]
+__all__ = ["extendable", "extended", "is_flag"]
+
+
+def extendable(known: Known) -> bool:
+    """Whether anything may be extended, whatever is new: an example tells enough, and there is a mode, or a flag."""
+    told = verifying_bits(known.y, known.scale) >= 2.0 * EVIDENCE
+    return told and (bool(known.clusters) or is_flag(known.y))
 
 
 def extended(
@@ -57,9 +63,9 @@ def extended(
     Cost O(fresh * modes * columns * (examples of the mode + pool)), both at most `SEARCHED_ROWS`, fresh at most
     `ENOUGH`.
     """
-    bits = verifying_bits(known.y, known.scale)
-    if not len(pool) or bits < 2.0 * EVIDENCE:
+    if not len(pool) or not extendable(known):
         return None
+    bits = verifying_bits(known.y, known.scale)
     if is_flag(known.y):
         value = float(known.y[pool[-1]])
         half = least_examples(known.y, known.scale, known.config) / 2

@@ -13,7 +13,7 @@ from relgym.clustering.discovery import counts, find_mode, searched, verifying_b
 from relgym.clustering.em import Cluster
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.exchange import orders_of
-from relgym.clustering.extension import extended, is_flag
+from relgym.clustering.extension import extendable, extended, is_flag
 from relgym.clustering.merging import Known, generalise
 from relgym.clustering.mode import NOISE
 from relgym.clustering.population import Population
@@ -113,8 +113,9 @@ class ModeSearch:
         slots = table.signatures[signature]
         patience = self._patience(search, bool(slots.features), bool(slots.features or slots.chained))
         if search.waiting <= patience or self._hunt is not None:
-            if extended(
-                population.known(table), signature, self._newest(table, signature), fresh=1, flags=True
+            known = population.known(table)
+            if extendable(known) and extended(
+                known, signature, self._newest(table, signature), fresh=1, flags=True
             ):
                 self._extend(table, signature, self._pool(table, signature), fresh=1, flags=True)
             return

@@ -112,3 +112,25 @@ def test_a_tree_never_errs_more_than_the_majority(seed: int) -> None:
     x, positive = rng.normal(size=(50, 2)), rng.random(50) < 0.4
     wrong = np.sum(learn_tree(x, positive).predict_batch(x) != positive)
     assert wrong <= min(positive.sum(), (~positive).sum())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_whole_weights_part_as_the_same_ones_in_another_unit(seed: int) -> None:
+    """Entropies of whole numbers are looked up, those of others worked out: both say the same of every cut."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(50, 3)).round(1)
+    x[rng.random(x.shape) < 0.1] = NAN
+    positive = (np.nan_to_num(x[:, 0]) > 0.2) ^ (rng.random(50) < 0.1)
+    whole = rng.integers(1, 4, size=50).astype(float)
+    one, other = (
+        learn_tree(x, positive, weights=unit * whole, min_leaf=1, prune=False) for unit in (1.0, 0.3)
+    )
+    assert (one.column, one.threshold) == (other.column, other.threshold)
+    np.testing.assert_allclose(other.positive, 0.3 * np.array(one.positive), rtol=1e-12)
+
+
+def test_infinite_values_are_cut_off_as_undefined_ones_are() -> None:
+    x = np.array([[0.0], [0.0], [1.0], [np.inf], [np.inf], [NAN]])
+    tree = learn_tree(x, ~np.isfinite(x[:, 0]), min_leaf=1, prune=False)
+    assert tree.predict_batch(x).tolist() == [False, False, False, True, True, True]
