@@ -22,7 +22,7 @@ from relgym.clustering.features import features_for
 from relgym.clustering.mode import NOISE, Mode
 from relgym.clustering.roles import Binding
 from relgym.config import ModelConfig
-from relgym.config.constants import EVIDENCE, FEWEST, LEFT_OPEN, MEMORY, RECENT, SEARCHED_CELLS
+from relgym.config.constants import EVIDENCE, FEWEST, LEFT_OPEN, MEMORY, RECENT, ROUGH, SEARCHED_CELLS
 from relgym.model.percepts.grouping import distinct, members
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.predicting.calibration import EXPERTS, OWN, Assessment, Calibration, Key
@@ -406,10 +406,20 @@ class PropertyModel:
 
     @property
     def reliable(self) -> frozenset[int]:
-        """Modes that are told from all others without an error in what is remembered, if laws explain what was seen."""
-        return (
-            frozenset(self.classifier.flawless - self.casting.flawed) if self.accounted_for else frozenset()
-        )
+        """Modes that are told from all others without an error in what is remembered, if laws explain what was seen.
+
+        But none that scatters by more than what comes out right may be off: with so wide a tolerance anything explains
+        what was seen, and what others leave is known better.
+        """
+        if not self.accounted_for:
+            return frozenset()
+        return frozenset(mode for mode in self.classifier.flawless - self.casting.flawed if self._sharp(mode))
+
+    def _sharp(self, mode: int) -> bool:
+        """Whether a mode leaves no more than rounding of its examples, or so little that nearly all come out right."""
+        sigma = self.mode(mode).sigma
+        right = 2.0 * sigma <= self.config.claim_error * self.calibration.change
+        return right or sigma <= ROUGH * self.clusterer.floor
 
     @property
     def proven(self) -> int:

@@ -98,3 +98,15 @@ def test_what_scatters_by_more_than_is_right_is_not_proven() -> None:
         noisy = step.after.replace({(name, "gap"): step.after[name]["gap"] + rng.normal() for name in "abcd"})
         compare_and_learn(part, Transition(step.before, noisy), part.predict_one(step.before))
     assert part.property_model("agent", "gap").proven == 0
+
+
+def test_a_mode_that_scatters_by_more_than_is_right_is_to_prove_itself() -> None:
+    exact = learned(SECOND, 20).property_model("agent", "gap")
+    assert exact.reliable == set(exact.classifier.modes) != set()
+    model, rng = WorldModel(TEAM, {"clustering": {"noise_std": 1.0}}, targets=[GAP]), np.random.default_rng(0)
+    for step in walks(100, SECOND):
+        anywhere = step.after.replace({(name, "gap"): rng.normal() for name in "abcd"})
+        compare_and_learn(model, Transition(step.before, anywhere), model.predict_one(step.before))
+    loose = model.property_model("agent", "gap")
+    assert loose.classifier.modes and loose.accounted_for  # within a noise that is declared
+    assert loose.reliable == set()
