@@ -19,8 +19,8 @@ law that changed is doubted at once, and a mode whose conditions were found is b
 believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
 known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
 Where it had none yet, all cells together tell whether it speaks. A new mode speaks at once if others were right in what
-they said of changes, laws explain what is seen, and it is told from all others without an error; else it is to prove
-itself first.
+they said of changes, laws explain what is seen, and it is told from all others without an error and scatters by less
+than what comes out right may be off; else it is to prove itself first.
 
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
