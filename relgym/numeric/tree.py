@@ -183,7 +183,8 @@ def learn_tree(
             "a tree needs as many classes and weights as rows and a name per column; "
             f"got x of shape {x.shape}, {len(positive)} classes, {len(weights)} weights, {len(names)} names"
         )
-    whole = weights.sum() <= x.size and np.array_equal(weights, weights.astype(np.intp))
+    # Few, so that what is looked up is soon there, and differences of sums are exact to far less than `ROUNDED`.
+    whole = weights.sum() <= CACHED and np.array_equal(weights, weights.astype(np.intp))
     grower = _Grower(
         np.ascontiguousarray(x.T),
         np.asarray(positive, dtype=np.bool_),
@@ -271,7 +272,8 @@ class _Grower:
                 gaps, thresholds = _gaps(values[k], near)
                 pick = int(np.argmax(gaps))
                 entropy, gap = float(entropies[k, near[pick]]), float(gaps[pick])
-                if best is None or entropy < best[0] - ROUNDED or -gap < best[1]:
+                closer = best is None or entropy < best[0] - ROUNDED
+                if closer or (best is not None and entropy <= best[0] + ROUNDED and -gap < best[1]):
                     best = entropy, -gap, first + k, float(thresholds[pick])
         return best, cuts
 
@@ -298,26 +300,28 @@ class _Grower:
             weight = np.arange(1, order.shape[1] + 1)[None]
         else:
             weight = np.cumsum(self.weights[order], axis=1)
-        left: _Float2D = _both(weight) - _both(hit) - _both(weight - hit)
-        return left
+        if weight.dtype == hit.dtype == np.intp:
+            left: _Float2D = _both(weight) - _both(hit) - _both(weight - hit)
+            return left
+        below, above, some = weight[:, :-1], weight[:, -1:] - weight[:, :-1], hit[:, :-1]
+        return _entropy(some, below - some) + _entropy(hit[:, -1:] - some, above - (hit[:, -1:] - some))
 
 
-def _both(weight: _Weights) -> _Float2D:
-    """Sum of w log2 w of the weights on either side of all cuts, by cumulative sums of shape ``(d, n)``.
-
-    Whole numbers are looked up.
-    """
-    below, above = weight[:, :-1], weight[:, -1:] - weight[:, :-1]
-    if weight.dtype == np.intp:
-        known = _x_log_x(np.arange(int(weight[:, -1].max()) + 1.0))
-        both: _Float2D = known[below] + known[above]
-        return both
-    return _x_log_x(below.astype(np.float64)) + _x_log_x(np.maximum(above, 0.0, dtype=np.float64))
+def _both(weight: NDArray[np.intp]) -> _Float2D:
+    """Sum of w log2 w of the weights on either side of all cuts, looked up, by cumulative sums of shape ``(d, n)``."""
+    known = np.arange(int(weight[:, -1].max()) + 1.0)
+    known *= np.log2(np.maximum(known, 1.0))
+    both: _Float2D = known[weight[:, :-1]] + known[weight[:, -1:] - weight[:, :-1]]
+    return both
 
 
-def _x_log_x(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    found: NDArray[np.float64] = x * np.log2(np.where(x > 0.0, x, 1.0))
-    return found
+def _entropy(positive: NDArray[np.float64], negative: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Total entropy in bits of groups with these weights: sum of ``-w log2(share)``, exact however large they are."""
+    total = np.maximum(positive + negative, float(np.finfo(np.float64).tiny))
+    parts = [np.maximum(part, 0.0) for part in (positive, negative)]
+    bits = [-part * np.log2(np.where(part > 0, part / total, 1.0)) for part in parts]
+    total_bits: NDArray[np.float64] = bits[0] + bits[1]
+    return total_bits
 
 
 def _gaps(values: _Float1D, near: NDArray[np.intp]) -> tuple[_Float1D, _Float1D]:

@@ -134,3 +134,12 @@ def test_infinite_values_are_cut_off_as_undefined_ones_are() -> None:
     x = np.array([[0.0], [0.0], [1.0], [np.inf], [np.inf], [NAN]])
     tree = learn_tree(x, ~np.isfinite(x[:, 0]), min_leaf=1, prune=False)
     assert tree.predict_batch(x).tolist() == [False, False, False, True, True, True]
+
+
+def test_a_tie_is_one_however_large_weights_are() -> None:
+    rng = np.random.default_rng(0)
+    positive = np.arange(300) < 100
+    near, far = (np.where(positive, 0.0, gap) + rng.uniform(0.0, 1.0, 300) for gap in (1.1, 3.0))
+    for weights in (None, rng.uniform(1e7, 1e9, 300)):
+        tree = learn_tree(np.column_stack([near, far]), positive, weights=weights)
+        assert tree.column[0] == 1 and 1.0 < tree.threshold[0] < 3.0
