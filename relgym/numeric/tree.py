@@ -316,7 +316,7 @@ def _both(weight: NDArray[np.intp]) -> _Float2D:
 
 
 def _entropy(positive: NDArray[np.float64], negative: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Total entropy in bits of groups with these weights: sum of ``-w log2(share)``, exact however large they are."""
+    """Total entropy in bits of groups with these weights: sum of ``-w log2(share)``, which large weights don't blur."""
     total = np.maximum(positive + negative, float(np.finfo(np.float64).tiny))
     parts = [np.maximum(part, 0.0) for part in (positive, negative)]
     bits = [-part * np.log2(np.where(part > 0, part / total, 1.0)) for part in parts]

@@ -413,13 +413,13 @@ class PropertyModel:
         """
         if not self.accounted_for:
             return frozenset()
-        return frozenset(mode for mode in self.classifier.flawless - self.casting.flawed if self._sharp(mode))
+        rounding = ROUGH * self.clusterer.floor
+        told = self.classifier.flawless - self.casting.flawed
+        return frozenset(mode for mode in told if self.mode(mode).sigma <= rounding or self._sharp(mode))
 
     def _sharp(self, mode: int) -> bool:
-        """Whether a mode leaves no more than rounding of its examples, or so little that nearly all come out right."""
-        sigma = self.mode(mode).sigma
-        right = 2.0 * sigma <= self.config.claim_error * self.calibration.change
-        return right or sigma <= ROUGH * self.clusterer.floor
+        """Whether a mode scatters by so little that nearly all it says comes out right."""
+        return 2.0 * self.mode(mode).sigma <= self.config.claim_error * self.calibration.change
 
     @property
     def proven(self) -> int:
@@ -434,7 +434,7 @@ class PropertyModel:
         if len(self.classifier.modes) != 1 or known.approximate or known.noise_examples:
             return 0
         (only,) = self.classifier.modes
-        if 2.0 * self.mode(only).sigma > self.config.claim_error * self.calibration.change:
+        if not self._sharp(only):
             return 0
         if self.casting.embodied(self.mode(only)) or len(self.functions.places.get(only, (0,))) != 1:
             return 0
