@@ -32,6 +32,7 @@ from relgym.config.constants import (
     EXACT,
     EXTRAPOLATED,
     FEW_VALUES,
+    FEWER,
     FEWEST,
     FOUNDING,
     MAJORITY,
@@ -204,7 +205,7 @@ def find_mode(
             terms=terms,
             size=size,
             draws=max(
-                SAMPLES_TRIED, config.draws // (1 if columns == stages[0] else 3 if columns <= WIDE else 12)
+                SAMPLES_TRIED, config.draws // FEWER[0 if columns == stages[0] else 1 + (columns > WIDE)]
             ),
             rng=rng,
             strata=strata[rows],
@@ -312,7 +313,13 @@ def _in_any_order(
     for reading in readings(x, orders):
         least = max(needed, least_examples(y, scale, config, choices=len(reading.orders)))
         fits = yield from reading.candidates(
-            y, sigma=scale.sigma, loose=loose, terms=terms, draws=config.draws // 3, fresh=fresh, rng=rng
+            y,
+            sigma=scale.sigma,
+            loose=loose,
+            terms=terms,
+            draws=config.draws // FEWER[1],
+            fresh=fresh,
+            rng=rng,
         )
         for fit in fits:
             read = reading.best(fit, y, scale.sigma)
@@ -408,7 +415,7 @@ def plans(stages: tuple[int, ...], config: ClusteringConfig) -> list[tuple[int, 
             found += [(width, 0, FEWEST)] if width == stages[0] else []
             found += [(width, terms, FEWEST * (terms + VERIFYING)) for terms in (half, most)]
             continue
-        if width <= 6:  # few enough to fit them all and drop what is needless
+        if width + 1 + VERIFYING < min(FOUNDING):  # few enough to fit them all and drop what is needless
             found.append((width, min(width, most), min(width, most) + 1 + VERIFYING))
         else:
             found.append((width, min(2, most), 2 + 1 + VERIFYING))  # two weights and a constant

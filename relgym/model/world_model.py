@@ -18,7 +18,7 @@ from relgym.arguments import array_of, refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.config.checks import checked_count
-from relgym.config.constants import ALL_DIGITS, DIGITS, MOST_STEPS, SUMMABLE
+from relgym.config.constants import ALL_DIGITS, DIGITS, MOST_STEPS, PATIENCE, SUMMABLE
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
@@ -50,7 +50,7 @@ from relgym.model.reports.text import SURFACES
 from relgym.model.running.compiled import KERNEL
 from relgym.model.running.lowering import lowered
 from relgym.model.running.rolling import BatchRollout, step_by_step
-from relgym.model.running.runner import PATIENCE, Programs, Runner
+from relgym.model.running.runner import Programs, Runner
 from relgym.model.running.trusting import trusting
 from relgym.model.target.hindsight import (
     Confirmed,

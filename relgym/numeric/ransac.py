@@ -26,6 +26,7 @@ from relgym.config.constants import (
     ALIKE,
     CACHED,
     CALL,
+    ENOUGH,
     EXTRAPOLATED,
     LITTLE,
     ROUNDED,
@@ -326,8 +327,8 @@ def _best_columns(
 
 
 def _pieces(count: int, room: int, cells: int) -> Iterator[slice]:
-    """Slices of so many samples, each of as many as there is room for with so many cells, but of 16 at least."""
-    step = max(16, room // max(1, cells))
+    """Slices of so many samples, each of as many as there is room for with so many cells, but of `ENOUGH` at least."""
+    step = max(ENOUGH, room // max(1, cells))
     return (slice(begin, begin + step) for begin in range(0, count, step))
 
 

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import SHORT
+from relgym.config.constants import FIRST, SHORT
 
 __all__ = ["VersionSpace"]
 
@@ -61,7 +61,7 @@ class VersionSpace:
         negative: NDArray[np.float64],
         *,
         rng: np.random.Generator,
-        count: int = 64,
+        count: int = FIRST,
         longest: int = SHORT,
     ) -> None:
         self._least, self._most = positive.min(axis=0), positive.max(axis=0)

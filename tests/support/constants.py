@@ -9,13 +9,16 @@ from dataclasses import dataclass
 from source_tree import Module, modules
 
 PACKAGES = ("classification", "clustering", "hypotheses", "laws", "logic", "model", "numeric", "scheduling")
-"""What learns and decides; `config` is where constants belong."""
+"""What learns and decides."""
+
+CONFIG = "relgym.config.constants"
+"""Where constants belong; what is written there as what it follows from isn't counted."""
 
 LEFT_OUT = ("relgym.model.files", "relgym.model.reports")
 """What checks files and what prints: widths, digits and versions tune nothing."""
 
 PLAIN = frozenset({0, 1, 2, 0.5})
-"""Numbers that say nothing by themselves: none, one, both, half."""
+"""Numbers that say nothing by themselves: none, one, both, half. Under a name of their own only none and one do."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,14 @@ def constants() -> tuple[Constant, ...]:
     return tuple(
         c
         for module in modules()
-        if module.package in PACKAGES and not module.name.startswith(LEFT_OUT)
+        if module.name == CONFIG or (module.package in PACKAGES and not module.name.startswith(LEFT_OUT))
         for c in _constants(module)
     )
 
 
 def counted() -> dict[str, tuple[int, int]]:
     """Constants of each package: named ones, and numbers in the code besides."""
-    found = {package: [0, 0] for package in PACKAGES}
+    found = {package: [0, 0] for package in (*PACKAGES, "config")}
     for constant in constants():
         found[constant.package][0 if constant.named else 1] += 1
     return {package: (named, inline) for package, (named, inline) in found.items()}
@@ -61,13 +64,22 @@ def counted() -> dict[str, tuple[int, int]]:
 def _constants(module: Module) -> Iterator[Constant]:
     for statement in module.tree.body:
         if names := _names(statement):
-            if any(_numbers(statement)):
+            sizes = {abs(number.value) for number in _numbers(statement)}
+            if sizes - (PLAIN if _follows(statement) else {0, 1}):
                 for name in names:
                     yield Constant(f"{module.file}:{statement.lineno}", module.package, name, named=True)
             continue
         for node in _numbers(statement):
             if abs(node.value) not in PLAIN:
                 yield Constant(f"{module.file}:{node.lineno}", module.package, repr(node.value), named=False)
+
+
+def _follows(statement: ast.stmt) -> bool:
+    """Whether a constant is worked out from others, or from the machine's numbers."""
+    value = getattr(statement, "value", None)
+    return value is not None and any(
+        isinstance(node, ast.Name) and node.id.lstrip("_").isupper() for node in ast.walk(value)
+    )
 
 
 def _names(statement: ast.stmt) -> list[str]:

@@ -20,13 +20,13 @@ import numpy as np
 from file_mutations import Arrays, Mutator
 from numpy.typing import NDArray
 
+from relgym.config.constants import PATIENCE
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
 from relgym.files.reading import ARCHIVE, read_members
 from relgym.model.files.storage import read_model, write_model
 from relgym.model.files.upgrade import upgraded
 from relgym.model.running.compiled import KERNEL
-from relgym.model.running.runner import PATIENCE
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 from relgym.wrappers import ModelLearner

@@ -18,15 +18,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import LARGE, MORE_ROOM, MOST_BYTES
+from relgym.config.constants import CHECKPOINT, LARGE, MORE_ROOM, MOST_BYTES
 
 __all__ = ["Journal"]
 
 Entry: TypeAlias = tuple[str, tuple[Any, ...]]
 """Name of the method that made a step, and what it was given."""
-
-STEPS = 1_000
-"""A checkpoint is taken after so many steps at the latest: a rollback takes as long as so many steps."""
 
 
 class Journal:
@@ -34,7 +31,7 @@ class Journal:
 
     Notes
     -----
-    Costs one serialised copy of the object in memory, the steps kept, and the time to serialise it once in `STEPS`
+    Costs one serialised copy of the object in memory, the steps kept, and the time to serialise it once in `CHECKPOINT`
     steps: of a long history little more than what it takes to copy its bytes, some 0.25 ms a megabyte. For that a copy
     takes up the room of the last one: memory that is new to a process takes several times as long to write to, and what
     is freed and asked for in ever other sizes leaves gaps that nobody fills. What can't be serialised, such as a user's
@@ -59,7 +56,7 @@ class Journal:
             Gives all that steps change; called where a checkpoint is due.
         """
         full = self._numbers * np.float64().nbytes >= MOST_BYTES
-        if self._taken is None or len(self._taken[1]) >= STEPS or full:
+        if self._taken is None or len(self._taken[1]) >= CHECKPOINT or full:
             if self._taken is not None:
                 self._needless = self._taken[1]
             self._taken = None  # its copies are about to be overwritten

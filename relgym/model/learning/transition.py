@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
-from relgym.config.constants import UNIT
+from relgym.config.constants import CHECK_AT, UNIT
 from relgym.html import html_table
 from relgym.model.learning.forgetting import forget
 from relgym.model.learning.stillness import recall
 from relgym.model.parts import Parts
 from relgym.model.percepts.perception import Percept
 from relgym.model.percepts.scenes import next_values, passage, unwrapped
-from relgym.model.predicting.chaining import CHECK_AT, due, inquire, revise
+from relgym.model.predicting.chaining import due, inquire, revise
 from relgym.model.predicting.prediction import ScenePrediction
 from relgym.model.target.hindsight import Confirmed
 from relgym.model.target.property_model import bodies_of

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import PAIRS
+from relgym.config.constants import NEAREST, PAIRS
 from relgym.errors import ConfigError
 from relgym.model.learning.transition import NOTHING, LearnReport, learn
 from relgym.model.parts import Parts
@@ -45,9 +45,6 @@ Ask: TypeAlias = Callable[[Scene, Callable[[Scene], Percept]], ScenePrediction |
 
 MOST = math.isqrt(PAIRS)
 """Scenes of no more bodies than this are looked at as a whole."""
-
-NEAREST = 32
-"""About so many bodies, at least one of each type, make a small scene."""
 
 SINGLY = PAIRS // (NEAREST * NEAREST)
 """So many objects are looked at one by one: of a transition at most so many that changed are learned from, and up to so

@@ -18,19 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, ENOUGH, FIRST, LAYOUTS, SUMMABLE
+from relgym.config.constants import ALIKE, ENOUGH, FIRST, LAYOUTS, OUTLYING, REPEATED, SUMMABLE
 from relgym.scene.objects import SceneLayout
 
 __all__ = ["Screen"]
-
-FACTOR = 32.0
-"""A number this much larger than what is known of its property is suspicious; so of `FIRST` suspicious ones `ENOUGH`
-within this factor of one another are no errors."""
-
-SUPPORT = 5
-"""So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
-one step and before the next one, don't widen the limit. So many suspicious ones that are exactly equal are no errors
-(rewards, codes), nor are so many in successive transitions (another scale)."""
 
 MOST = math.sqrt(SUMMABLE)
 """Larger numbers are always set aside: searches square products of two, whose sums may overflow."""
@@ -73,7 +64,7 @@ class Screen:
     def __init__(self) -> None:
         self.set_aside = 0
         self._names: dict[tuple[str, str], int] = {}
-        self._largest = np.zeros((0, SUPPORT))  # largest magnitudes, ascending
+        self._largest = np.zeros((0, REPEATED))  # largest magnitudes, ascending
         self._scenes = np.zeros(0, dtype=np.int64)  # scenes in which a property was seen, up to ENOUGH
         self._waiting: dict[int, list[float]] = {}  # suspicious numbers, the latest last
         self._run: dict[int, int] = {}  # successive transitions with a suspicious number
@@ -169,7 +160,7 @@ class Screen:
             if not len(some):
                 return np.full(len(known), 1.0 / ALIKE)
             most = float(some.max())
-            limits = FACTOR * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
+            limits = OUTLYING * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
             # Of the first scenes only that is suspicious beside which all that is known, and 1, are next to nothing.
             limits[self._scenes < ENOUGH] = max(most, 1.0) / ALIKE
             self._limits = np.minimum(limits, MOST)
@@ -201,8 +192,8 @@ class Screen:
             waiting.append(value)
             del waiting[:-FIRST]
             size = abs(value)
-            alike = sum(size / FACTOR <= abs(other) <= size * FACTOR for other in waiting)
-            if alike >= ENOUGH or waiting.count(value) >= SUPPORT or self._run[place] >= SUPPORT:
+            alike = sum(size / OUTLYING <= abs(other) <= size * OUTLYING for other in waiting)
+            if alike >= ENOUGH or waiting.count(value) >= REPEATED or self._run[place] >= REPEATED:
                 self._largest[place] = size  # known, as if so many had come
                 self._moved()
                 del self._waiting[place], self._run[place]
@@ -213,7 +204,7 @@ class Screen:
             place = self._names.setdefault(pair, len(self._names))
             self._widen()
             both = np.concatenate([self._largest[place], other._largest[theirs]])
-            self._largest[place] = np.sort(both)[-SUPPORT:]
+            self._largest[place] = np.sort(both)[-REPEATED:]
             self._scenes[place] = min(ENOUGH, int(self._scenes[place] + other._scenes[theirs]))
         self._moved()
         self.set_aside += other.set_aside
@@ -243,7 +234,7 @@ class Screen:
         rows = data["properties"]
         self.set_aside = int(data["set_aside"])
         self._names = {(str(row[0]), str(row[1])): k for k, row in enumerate(rows)}
-        self._largest = np.array([row[3] for row in rows], dtype=np.float64).reshape(len(rows), SUPPORT)
+        self._largest = np.array([row[3] for row in rows], dtype=np.float64).reshape(len(rows), REPEATED)
         self._scenes = np.array([row[2] for row in rows], dtype=np.int64)
         self._waiting = {k: [float(v) for v in row[4]] for k, row in enumerate(rows) if row[4]}
         self._run = {k: int(row[5]) for k, row in enumerate(rows) if row[5]}

@@ -49,7 +49,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.config.constants import COVERED, EVIDENCE, MEMORY, NEARLY_ALL, SUMMABLE
+from relgym.config.constants import COVERED, EVIDENCE, FEW, MEMORY, NEARLY_ALL, OCTAVE, SUMMABLE
 from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_REGRESSION, OF_WINNER
 
 __all__ = [
@@ -79,12 +79,6 @@ _VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 
 _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
-
-FEW: Final = 32
-"""In a cell of fewer trials what all cells of the outcome say counts; and fewer hits don't end a record."""
-
-OCTAVE: Final = 4
-"""Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
 
 _EXACT: Final = -(1 << 14)
 """The bin of errors no larger than rounding."""

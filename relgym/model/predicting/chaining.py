@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import Scale, identified, is_law, law_cells
-from relgym.config.constants import ALIKE, ENOUGH, NEARLY_ALL, SEARCHED_ROWS
+from relgym.config.constants import ALIKE, ENOUGH, NEARLY_ALL, ORDER_PLANS, SEARCHED_ROWS
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
@@ -30,13 +30,7 @@ from relgym.scheduling.work import Steps, Task, resumable
 if TYPE_CHECKING:
     from relgym.model.parts import Parts
 
-__all__ = ["CHECK_AT", "Inquiry", "Look", "due", "in_order", "inquire", "revise"]
-
-CHECK_AT = (48, 192, 768, 3072)
-"""Numbers of examples of a type after which the order of its targets is looked at again."""
-
-PLANS = ((2, 5, 256), (4, 10, 128))
-"""Terms, sample size and draws of the searches for such a law."""
+__all__ = ["Inquiry", "Look", "due", "in_order", "inquire", "revise"]
 
 _Pair = tuple[str, str]
 
@@ -180,7 +174,7 @@ def _better(
     seed, support
         As in the configuration.
     """
-    for scale, (terms, sample, draws) in itertools.product(scales, PLANS):
+    for scale, (terms, sample, draws) in itertools.product(scales, ORDER_PLANS):
         rng = np.random.default_rng([seed, len(y)])
         found = yield from consensus.steps(
             x,

@@ -16,7 +16,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.features import library_of, offered, switched_on
 from relgym.clustering.mode import NOISE, sum_text
-from relgym.config.constants import MOST_FEATURES, NEARLY_ALL
+from relgym.config.constants import MOST_FEATURES, NEARLY_ALL, ROUGH
 from relgym.model.parts import Parts
 from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.reports.text import percent
@@ -42,9 +42,6 @@ MOST = 0.5
 
 LEAST, ROWS, UNEXPLAINED = 100, 1000, 0.1
 """Fewer examples than this say nothing; the newest so many are looked at; so large a share of noise needs advice."""
-
-ROUGH = 4.0
-"""So many times the rounding noise can't be rounding."""
 
 _EXACT, FINE = 1e-5, 1e-3
 """Shares of the change that count as nothing, and as nothing to be mended."""

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.config.constants import REPAID
+from relgym.config.constants import PATIENCE, REPAID
 from relgym.model.parts import Parts
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.percepts.scenes import scene_of, wrap
@@ -47,11 +47,7 @@ from relgym.program.records import TOUCHING, Answer, BeyondError, Program, Trust
 from relgym.program.tape import Tape, encoded, kind_of, ordered
 from relgym.scene.objects import Scene, SceneLayout
 
-__all__ = ["PATIENCE", "Programs", "Runner"]
-
-PATIENCE = 2
-"""A program is lowered for the last of so many scenes that are asked since what a model says has changed; arrays answer
-those before it, which takes about as long as to lower it (rent or buy: Karlin et al. 1988)."""
+__all__ = ["Programs", "Runner"]
 
 _PREDICTED, _DEPENDS = OUTCOMES.index(Outcome.PREDICTED), OUTCOMES.index(Outcome.DEPENDS)
 _Bits = NDArray[np.int64]

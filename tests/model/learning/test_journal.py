@@ -108,7 +108,7 @@ def test_an_error_at_any_boundary_of_a_call_leaves_the_model_as_it_was(at: int) 
 
 
 def test_after_a_rollback_learning_goes_on_as_if_nothing_had_been(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journal, "STEPS", 16)
+    monkeypatch.setattr(journal, "CHECKPOINT", 16)
     steps = lessons()
     calm, troubled = (WorldModel(steps[0].before.schema) for _ in range(2))
     for k, transition in enumerate(steps):
@@ -191,15 +191,15 @@ def test_no_more_steps_are_held_than_before_a_checkpoint() -> None:
 
     kept, alive = journal.Journal(), weakref.WeakSet[Step]()
 
-    for number in range(3 * journal.STEPS):
+    for number in range(3 * journal.CHECKPOINT):
         kept.prepare(dict)
         alive.add(step := Step())
         kept.add("step", (step,))
         del step
-        assert len(alive) <= min(number + 1, journal.STEPS)
+        assert len(alive) <= min(number + 1, journal.CHECKPOINT)
     done: list[str] = []
     kept.replayed(lambda whole, name, given: done.append(name))
-    assert len(done) == journal.STEPS
+    assert len(done) == journal.CHECKPOINT
 
 
 def test_the_collector_is_as_it_was() -> None:

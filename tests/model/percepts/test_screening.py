@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.config.constants import ALIKE, ENOUGH
+from relgym.config.constants import ALIKE, ENOUGH, OUTLYING, REPEATED
 from relgym.model.learning.fitting import compare_and_learn
-from relgym.model.percepts.screening import FACTOR, MOST, SUPPORT, Screen
+from relgym.model.percepts.screening import MOST, Screen
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ObjectType, Scene, SceneLayout, Target, Transition
 from relgym.scene.schema import SceneSchema
@@ -58,7 +58,7 @@ def test_what_grows_gradually_is_no_error() -> None:
 def test_another_scale_is_believed_after_some_steps() -> None:
     screen = accustomed()
     taken = [screen.admits(layout(), np.array([1e6 + k, 1.0]), np.array([1e6 + k, 1.0])) for k in range(20)]
-    assert taken == [False] * (SUPPORT - 1) + [True] * (21 - SUPPORT)
+    assert taken == [False] * (REPEATED - 1) + [True] * (21 - REPEATED)
     assert admits(screen, 5.0)
 
 
@@ -82,7 +82,7 @@ def test_an_outlier_among_the_first_scenes_leaves_no_trace() -> None:
     screen.admits(layout(), np.array([1e5, 1.0]), np.array([1.0, 1.0]))
     for _ in range(30):
         assert screen.admits(layout(), rng.uniform(-10, 10, 2), rng.uniform(-10, 10, 2))
-    assert not admits(screen, FACTOR * 10.1)
+    assert not admits(screen, OUTLYING * 10.1)
 
 
 def test_plain_data_bring_it_back() -> None:
@@ -121,9 +121,9 @@ def test_limits_by_hand() -> None:
     )  # 2 2 3 3 4 4: the fifth is 2
     screen = seen(*[(4.0, 0.5)] * ENOUGH)
     # The median of 4 and 0.5 is 2.25, and v is allowed as much as a property usually is.
-    assert limits(screen) == [FACTOR * 4.0, FACTOR * 2.25]
+    assert limits(screen) == [OUTLYING * 4.0, OUTLYING * 2.25]
     still = seen(*[(4.0, 0.0)] * ENOUGH)
-    assert limits(still) == [FACTOR * 4.0] * 2  # never moved: the largest of all others stands in
+    assert limits(still) == [OUTLYING * 4.0] * 2  # never moved: the largest of all others stands in
     assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [1.0 / ALIKE] * 2
     assert (
         limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [1.0 / ALIKE] * 2
@@ -132,7 +132,7 @@ def test_limits_by_hand() -> None:
 
 def test_at_the_limit_a_number_is_admitted_and_beyond_it_not() -> None:
     screen = seen(*[(4.0, 4.0)] * ENOUGH)
-    at = FACTOR * 4.0
+    at = OUTLYING * 4.0
     assert screen.plausible(layout(), np.array([at, -at]))
     assert not screen.plausible(layout(), np.array([np.nextafter(at, np.inf), 0.0]))
     assert not screen.plausible(layout(), np.array([0.0, -np.nextafter(at, np.inf)]))
@@ -148,15 +148,15 @@ def test_equal_numbers_are_believed_the_fifth_time_though_others_come_between() 
         screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0 + k, 4.0]))
     assert taken == [False] * 4 + [True] * 2
     assert screen.set_aside == 4
-    assert limits(screen)[1] == FACTOR * 1e4
+    assert limits(screen)[1] == OUTLYING * 1e4
 
 
 def test_the_run_is_broken_by_what_is_plain() -> None:
     screen = seen(*[(4.0, 4.0)] * ENOUGH)
     taken = []
-    for k in range(3 * SUPPORT):
+    for k in range(3 * REPEATED):
         taken.append(screen.admits(layout(), np.array([4.0, 4.0]), np.array([1e4 * 5.0**k, 4.0])))
-        if k % (SUPPORT - 1) == SUPPORT - 2:
+        if k % (REPEATED - 1) == REPEATED - 2:
             assert screen.admits(layout(), np.array([4.0, 4.0]), np.array([4.0, 4.0]))
     assert not any(taken)
 
@@ -165,7 +165,7 @@ def test_what_two_screens_know_is_the_largest_of_both() -> None:
     one, other = seen(*[(4.0, 1.0)] * 10), seen(*[(2.0, 3.0)] * 10)
     other.set_aside = 3
     one.absorb(other)
-    assert limits(one) == [FACTOR * 4.0, FACTOR * 3.5]  # at least the median of 4 and 3
+    assert limits(one) == [OUTLYING * 4.0, OUTLYING * 3.5]  # at least the median of 4 and 3
     assert one.set_aside == 3
 
 
@@ -179,7 +179,7 @@ def test_another_scale_however_large_is_learned_and_saved(tmp_path: Path) -> Non
         compare_and_learn(
             model, Transition(now, scene(x + np.tanh(v / size) * size, noise)), model.predict_one(now)
         )
-    assert model.set_aside == SUPPORT - 1
+    assert model.set_aside == REPEATED - 1
     model.save(tmp_path / "model.relgym", history=True)
     again = WorldModel.load(tmp_path / "model.relgym")
     asked = scene(0.3e70, -0.2e70)

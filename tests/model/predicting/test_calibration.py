@@ -14,12 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relgym.config.constants import COVERED, MEMORY, NEARLY_ALL
+from relgym.config.constants import COVERED, FEW, MEMORY, NEARLY_ALL
 from relgym.mixing import GOLDEN, mixed_one
 from relgym.model.predicting.calibration import (
     _EXACT,
     EXPERTS,
-    FEW,
     GUESS,
     LATEST,
     OWN,
