@@ -325,7 +325,9 @@ class _Cell:
         """Take in what one expert was off by, if it had a value."""
         if error != error:
             return
-        record = self.records.setdefault(expert, _Record())
+        record = self.records.get(expert)
+        if record is None:
+            record = self.records[expert] = _Record()
         if _makes_claims(expert):
             if record.count(error, within, times):
                 self.squares[expert] = [0.0, 0.0, 0.0]
@@ -365,12 +367,14 @@ class _Cell:
         """What some cells know together, of whoever spoke in one of them, but for errors; runs have no order then."""
         found = cls.new(PERSISTENCE, experts)
         for cell in cells:
-            for sums, more in zip(found.squares, cell.squares, strict=True):
-                sums[:] = [a + b for a, b in zip(sums, more, strict=True)]
+            for sums, (trials, own, base) in zip(found.squares, cell.squares, strict=True):
+                if trials:
+                    sums[0], sums[1], sums[2] = sums[0] + trials, sums[1] + own, sums[2] + base
             for expert, record in cell.records.items():
-                known = found.records.setdefault(expert, _Record())
-                known.trials += record.trials
-                known.hits += record.hits
+                known = found.records.get(expert)
+                if known is None:
+                    known = found.records[expert] = _Record()
+                known.trials, known.hits = known.trials + record.trials, known.hits + record.hits
         return found
 
     def credit(self, prior: float, bits: float) -> float:
@@ -482,10 +486,11 @@ class Calibration:
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
         self._united: _Cell | None = None  # see `_whole`
+        self._listed: list[_Cell] | None = None  # see `_all_cells`
 
     def __getstate__(self) -> dict[str, Any]:
         cached = ("_assessed", "_verdicts", "_claimed", "_least", "_kinds")
-        return self.__dict__ | {name: {} for name in cached} | {"_united": None}
+        return self.__dict__ | {name: {} for name in cached} | {"_united": None, "_listed": None}
 
     def _changed(self, *, cells: bool = True) -> None:
         """What was worked out from the cells is out of date; of which kinds there are, too, if cells came or went."""
@@ -496,6 +501,7 @@ class Calibration:
         self._united = None
         if cells:
             self._kinds.clear()
+            self._listed = None
 
     @property
     def reliable(self) -> frozenset[int] | None:
@@ -631,20 +637,19 @@ class Calibration:
         else:  # of a new winner nothing is known, and of those like it nothing good
             trusted = family = self._whole()
             speaker, known = self._anywhere(able, PERSISTENCE), [trusted]
-        share = self._right(key, speaker, _mean(family, speaker)) if self.trials else math.nan
+        heard = [c for c in (winner, cell) if c is not None and speaker in c.records]
+        share = self._right(key, speaker, _mean(family, speaker), heard) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
         half = self._half(trusted, speaker)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
 
-    def _right(self, key: Key, speaker: int, prior: float) -> float:
-        """How probably who speaks of a prediction is right; the prior is that of its family."""
-        _, winner, cell = (self._cells.get(each) for each in _levels(key))
-        heard = [c for c in (winner, cell) if c is not None and speaker in c.records]
+    def _right(self, key: Key, speaker: int, prior: float, heard: Sequence[_Cell]) -> float:
+        """How probably who speaks is right: the prior is that of the family, the cells are where he was heard."""
         if not _makes_claims(speaker):
             # In a cell of few trials those lacking are as those of its winner, and of that as those of its family.
-            share = prior if key.winner else _mean(self._whole(), speaker)
+            share = prior if key.winner else self._mean_of_all(speaker)
             for each in heard if key.winner else heard[:1]:  # without a winner they are one
                 share = each.records[speaker].filled(share)
             return share
@@ -652,6 +657,13 @@ class Calibration:
         said = heard[-1].records[speaker] if heard else _Record()
         share = said.share_of(speaker, prior, bits)
         return min(share, heard[-1].credit(prior, bits)) if heard and speaker == OWN else share
+
+    def _mean_of_all(self, speaker: int) -> float:
+        """`_mean` of who makes no claims in all cells together."""
+        known = [c.records[speaker] for c in self._all_cells() if speaker in c.records]
+        if not known:
+            return _mean(self._whole(), speaker)
+        return _Record(sum([r.trials for r in known]), sum([r.hits for r in known])).mean(0.5)
 
     def _far_out(self, key: Key) -> bool:
         """Whether an approximation that was asked before is asked far from what it was made of."""
@@ -694,7 +706,10 @@ class Calibration:
         return _interval([c.records[speaker].errors for c in cells if speaker in c.records])
 
     def _all_cells(self) -> list[_Cell]:
-        return [c for k, c in sorted(self._cells.items()) if k.lead >= 0 or k == _beside(OF_ALL)]
+        if self._listed is None:
+            known = sorted(self._cells.items())
+            self._listed = [c for k, c in known if k.lead >= 0 or k == _beside(OF_ALL)]
+        return self._listed
 
     def _whole(self) -> _Cell:
         """What all cells know together."""
@@ -1208,10 +1223,12 @@ def _interval(cells: Sequence[Mapping[int, float]]) -> float:
 
     By the bins of errors of all cells together.
     """
-    bins: dict[int, float] = {}
-    for each in cells:
-        for place, count in each.items():
-            bins[place] = bins.get(place, 0.0) + count
+    bins: Mapping[int, float] = cells[0] if cells else {}
+    if len(cells) > 1:
+        bins = dict(bins)
+        for each in cells[1:]:
+            for place, count in each.items():
+                bins[place] = bins.get(place, 0.0) + count
     count = sum(bins.values())
     return _quantile(bins, COVERED) if count >= COVERED * (count + 1.0) else math.nan
 
