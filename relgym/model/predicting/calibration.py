@@ -7,7 +7,9 @@ approximation how far from what it was made of it is asked; in those of its winn
 
 - the expert who coded what came in fewest bits gives the value; another one takes over when it leads by
   `EVIDENCE` bits (a prequential plug-in code: Dawid 1984, Rissanen 1984), and who does in all cells together where
-  it doesn't trail by as many. A law that can be claimed keeps the word where it is hardly worse;
+  it doesn't trail by as many. Of those who make no claims it is who does in all cells together in any case: errors of
+  one episode are alike, so that what one kind of predictions shows of them is often the luck of a few. A law that can
+  be claimed keeps the word where it is hardly worse;
 - the *probability* of being right is the posterior mean of the share of hits, its prior that of all that modes, or
   laws, said of changes with this outcome; and until the first miss a mode or law may be one that is always right, the
   likelier the more examples an only mode explains. A hit is off by no more than `ModelConfig.claim_error` of what
@@ -625,7 +627,11 @@ class Calibration:
         if known:
             trusted = known[-1] if known[-1].squares[PERSISTENCE][0] >= FEW else known[0]
             speaker = trusted.preferred(able, (self.probability, self.allowed))
-            others = [k for k in able if k != speaker and trusted.undecided(speaker, k)]
+            others = [
+                k
+                for k in able
+                if k != speaker and (_only_values(speaker, k) or trusted.undecided(speaker, k))
+            ]
             usual, wider = self._usual(known[0], able, speaker) if others else (speaker, trusted)
             if usual in others:
                 speaker = usual
@@ -678,9 +684,13 @@ class Calibration:
         return told._replace(probability=min(told.probability, 0.5))
 
     def _usual(self, winner: _Cell, able: tuple[int, ...], speaker: int) -> tuple[int, _Cell]:
-        """Who codes better than who would speak, by enough, in all cells of a winner, or in all; and in which."""
+        """Who codes better than who would speak, by enough, in all cells of a winner, or in all; and in which.
+
+        Who makes no claims is known by all cells together: what one kind shows of two of them is the luck of a few
+        episodes, in each of which errors are alike.
+        """
         best = winner.preferred(able, (self.probability, self.allowed))
-        if best != speaker and winner.lead(best, speaker) >= EVIDENCE:
+        if best != speaker and not _only_values(best, speaker) and winner.lead(best, speaker) >= EVIDENCE:
             return best, winner
         if _makes_claims(speaker):
             return speaker, winner
@@ -1159,6 +1169,11 @@ def _places(held: tuple[bool, ...]) -> tuple[int, ...]:
 def _makes_claims(speaker: int) -> bool:
     """Whether an expert is a mode, a law, or a law of a hypothesis class that was added; others have values only."""
     return speaker not in _VALUES
+
+
+def _only_values(first: int, second: int) -> bool:
+    """Whether neither of two experts makes claims."""
+    return not (_makes_claims(first) or _makes_claims(second))
 
 
 def _who(key: Key) -> int:

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from relgym.config.constants import COVERED, FEW, MEMORY, NEARLY_ALL
+from relgym.config.constants import COVERED, EVIDENCE, FEW, MEMORY, NEARLY_ALL
 from relgym.mixing import GOLDEN, mixed_one
 from relgym.model.predicting.calibration import (
     _EXACT,
@@ -851,13 +851,31 @@ def test_the_first_who_has_a_value_speaks_before_anything_is_known() -> None:
 def test_a_cell_of_few_trials_lets_its_winner_tell_who_speaks() -> None:
     known = Calibration(0.9)
     winner, here = KEY._replace(lead=OF_WINNER), KEY
-    known._cells = {winner: cell(60.0, 64.0, speaker=REGRESSION), here: cell(31.0, 31.0, speaker=OWN)}
+    other = KEY._replace(lead=KEY.lead + 1)
+    often = cell(60.0, 64.0, speaker=REGRESSION)
+    known._cells = {winner: often, other: copy.deepcopy(often), here: cell(31.0, 31.0, speaker=OWN)}
     known.trials = 64
     said = values(own=1.0, regression=1.0)
     assert known.assess(here, said).speaker == REGRESSION
     known = copy.deepcopy(known)
     known._cells[here] = cell(float(FEW), float(FEW), speaker=OWN)
     assert known.assess(here, said).speaker == OWN
+
+
+def test_of_two_who_make_no_claims_all_kinds_together_tell_who_speaks() -> None:
+    known = Calibration(0.9)
+    here, elsewhere = KEY._replace(winner=0, lead=0), KEY
+    few, many = (cell(0.0, n, speaker=PERSISTENCE) for n in (400.0, 800.0))
+    few.squares[REGRESSION], many.squares[REGRESSION] = [400.0, 500.0, 400.0], [800.0, 100.0, 800.0]
+    known._cells, known.trials = {here: few, elsewhere: many}, 1_200
+    assert few.lead(PERSISTENCE, REGRESSION) > 4 * EVIDENCE
+    assert known.assess(here, values(regression=1.0)).speaker == REGRESSION
+    few.squares[REGRESSION][1] = 1_500.0  # 1600 of 1200 are left of all
+    assert copy.deepcopy(known).assess(here, values(regression=1.0)).speaker == PERSISTENCE
+    # Who makes claims is known by each kind.
+    few.squares[OWN] = [400.0, 100.0, 400.0]
+    few.speaker = OWN
+    assert copy.deepcopy(known).assess(here, values(own=1.0, regression=1.0)).speaker == OWN
 
 
 def test_whose_record_is_asked_by_hand() -> None:
