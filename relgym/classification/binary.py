@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from relgym.classification.examples import Bools, Floats
 from relgym.classification.views import Context, Scope, View, bound_features
-from relgym.config.constants import FINE
+from relgym.config.constants import RESOLUTION
 from relgym.logic.clause import Definition
 from relgym.logic.csp import matches
 from relgym.numeric.tree import DecisionTree
 
 __all__ = ["VOTE_UNIT", "BinaryClassifier", "Outcome"]
 
-VOTE_UNIT: Final = FINE
+VOTE_UNIT: Final = RESOLUTION
 """Votes are counted in integer multiples of one over this: their sums are exact, whatever the order of summation."""
 
 _Rows = NDArray[np.int64]

@@ -29,10 +29,10 @@ from relgym.config.constants import (
     ACTING,
     ALIKE,
     CALL,
+    DRAW_DIVISORS,
     EXACT,
     EXTRAPOLATED,
     FEW_VALUES,
-    FEWER,
     FEWEST,
     FOUNDING,
     MAJORITY,
@@ -205,7 +205,8 @@ def find_mode(
             terms=terms,
             size=size,
             draws=max(
-                SAMPLES_TRIED, config.draws // FEWER[0 if columns == stages[0] else 1 + (columns > WIDE)]
+                SAMPLES_TRIED,
+                config.draws // DRAW_DIVISORS[0 if columns == stages[0] else 1 + (columns > WIDE)],
             ),
             rng=rng,
             strata=strata[rows],
@@ -317,7 +318,7 @@ def _in_any_order(
             sigma=scale.sigma,
             loose=loose,
             terms=terms,
-            draws=config.draws // FEWER[1],
+            draws=config.draws // DRAW_DIVISORS[1],
             fresh=fresh,
             rng=rng,
         )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing
-from relgym.config.constants import MOST_FEATURES, ORDERS
+from relgym.config.constants import FREQUENCIES, MOST_FEATURES
 from relgym.errors import ConfigError
 
 __all__ = [
@@ -206,7 +206,7 @@ class Library:
     def _simplest(self, names: Sequence[str], own: Sequence[bool]) -> tuple[list[Atom], list[Feature]]:
         """The factors of products, and the features that are none."""
         turning = [k for k, name in enumerate(names) if own[k] and self._turns(name)]
-        waves = [Atom(k, f, w) for k in turning for w in ORDERS for f in ("sin", "cos")]
+        waves = [Atom(k, f, w) for k in turning for w in FREQUENCIES for f in ("sin", "cos")]
         users = [kind for kind in self.kinds if kind not in {"trig", *_DEGREES}]
         for kind in users:
             _registered(kind)

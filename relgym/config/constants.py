@@ -20,23 +20,24 @@ __all__ = [
     "BEYOND",
     "CACHED",
     "CALL",
+    "CHAIN_PLANS",
     "CHECKPOINT",
     "CHECK_AT",
     "COVERED",
     "DIGITS",
     "DRAWS",
+    "DRAW_DIVISORS",
     "ENOUGH",
     "EVIDENCE",
     "EXACT",
     "EXTRAPOLATED",
     "FEW",
-    "FEWER",
     "FEWEST",
     "FEW_VALUES",
-    "FINE",
     "FIRST",
     "FIRST_ROOM",
     "FOUNDING",
+    "FREQUENCIES",
     "LARGE",
     "LAYOUTS",
     "LEAST_EXEMPLARS",
@@ -56,15 +57,14 @@ __all__ = [
     "NUMBER_BITS",
     "OCTAVE",
     "OFTEN",
-    "ORDERS",
-    "ORDER_PLANS",
     "OUTLYING",
     "PAIRS",
-    "PARTS",
     "PATIENCE",
+    "POWERS",
     "RECENT",
     "REPAID",
     "REPEATED",
+    "RESOLUTION",
     "ROUGH",
     "ROUNDED",
     "ROUNDINGS",
@@ -85,6 +85,7 @@ __all__ = [
     "TYPICAL",
     "UNIT",
     "VERIFYING",
+    "WEIGHT_PARTS",
     "WIDE",
 ]
 
@@ -170,12 +171,12 @@ has two of the difference, one of the product and one of the sum."""
 ROUGH: Final = STDS
 """So many times the rounding noise can't be rounding."""
 
-FINE: Final = 1 << 32
+RESOLUTION: Final = 1 << 32
 """Parts of a whole, or tolerances of a number, finer than which nothing is told: votes are counted in integer multiples
-of 1 / `FINE`, so that their sums are exact, in whatever order."""
+of 1 / `RESOLUTION`, so that their sums are exact, in whatever order."""
 
-NUMBER_BITS: Final = 1.0 + math.log2(FINE)
-"""Bits of a number that nothing tells: its sign, and which of `FINE` tolerances it has."""
+NUMBER_BITS: Final = 1.0 + math.log2(RESOLUTION)
+"""Bits of a number that nothing tells: its sign, and which of `RESOLUTION` tolerances it has."""
 
 SUMMABLE: Final = 10.0 ** math.floor(math.log10(math.sqrt(sys.float_info.max / 2**53)))
 """Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
@@ -226,7 +227,7 @@ mean square."""
 OCTAVE: Final = 4
 """Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
 
-PARTS: Final = 64
+WEIGHT_PARTS: Final = 64
 """Weights of examples are rounded to such parts of one: residues of rounding would pass for examples."""
 
 MOST_ROWS: Final = 3_000
@@ -258,9 +259,11 @@ and how often that is done: a budget, of 400 sweeps."""
 SHORT: Final = 3
 """Literals of a definition so short that a faultless one is taken as it is: hardly anything shorter would be found."""
 
-ORDERS: Final = (1, 2, 3)
-"""Of what goes on without end the first three are offered: powers of extents that inertia and shares may go with
-(length, area, volume), and multiples of an angle, of which higher ones are seldom seen in a law."""
+POWERS: Final = (1, 2, 3)
+"""Powers of extents that inertia and shares may go with: length, area, volume."""
+
+FREQUENCIES: Final = (1, 2, 3)
+"""Multiples of an angle of which sines and cosines are offered as columns: higher ones are seldom seen in a law."""
 
 DRAWS: Final = math.ceil(math.log(LEFT_OPEN) / math.log1p(-((2.0 * SMALL) ** 2)))
 """Random samples of two rows: of what holds for a fifth of the rows, all but one in fifty searches draws a sample."""
@@ -268,7 +271,7 @@ DRAWS: Final = math.ceil(math.log(LEFT_OPEN) / math.log1p(-((2.0 * SMALL) ** 2))
 WIDE: Final = max(FOUNDING)
 """Searches of more columns than found a mode as examples draw fewer and larger samples, and choose in a cheaper way."""
 
-FEWER: Final = (1, 3, 12)
+DRAW_DIVISORS: Final = (1, 3, 12)
 """How many times fewer random samples a search draws that looks at the fewest columns, at up to `WIDE`, at more: a
 budget, since each costs the more."""
 
@@ -283,7 +286,7 @@ SCENE_ROWS: Final = 1 + VERIFYING
 """Rows of each scene in a random sample of a few scenes: one tells what is constant in it, the others what changes. Of
 two scenes, the fewest, half of the six rows verify a function of a present value, an action and what is constant."""
 
-ORDER_PLANS: Final = ((2, 5, 256), (4, 10, 128))
+CHAIN_PLANS: Final = ((2, 5, 256), (4, 10, 128))
 """Terms, sample size and draws of the searches for a law of a next value that another one explains."""
 
 MOST_FEATURES: Final = 2 * MOST_ROWS

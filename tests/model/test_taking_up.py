@@ -289,7 +289,7 @@ def test_of_what_is_roughly_known_some_is_learned_from_until_the_world_changes()
 
 
 def test_models_of_what_is_roughly_known_are_hardly_worse_for_it() -> None:
-    some, fresh = list(curve(3_000)), list(curve(500, seed=9))
+    some, fresh = list(curve(6_000)), list(curve(500, seed=9))
     left = []
     for share in (0.0075, 0.0):
         model = WorldModel(BOX, {"downsampling": share}, targets=[SPEED])

@@ -63,7 +63,7 @@ def test_laws_of_other_worlds(trial: Any) -> None:
     assert_alike(parts, layout, vectors, 1e-14)
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(data=st.data(), shapes=st.integers(1, 3), balls=st.integers(1, 3), seed=st.integers(0, 10**6))
 def test_laws_of_any_form(data: st.DataObject, shapes: int, balls: int, seed: int) -> None:
     schema = room_schema(shapes, balls)

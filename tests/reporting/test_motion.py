@@ -190,7 +190,7 @@ def motion_of(book: LawBook) -> MotionRules:
     )
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(data=st.data(), shapes=st.integers(1, 3), balls=st.integers(1, 2), seed=st.integers(0, 10**6))
 def test_laws_of_any_form_say_the_same_once_they_were_read_back(
     data: st.DataObject, shapes: int, balls: int, seed: int

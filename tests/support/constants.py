@@ -78,7 +78,8 @@ def _follows(statement: ast.stmt) -> bool:
     """Whether a constant is worked out from others, or from the machine's numbers."""
     value = getattr(statement, "value", None)
     return value is not None and any(
-        isinstance(node, ast.Name) and node.id.lstrip("_").isupper() for node in ast.walk(value)
+        isinstance(node, ast.Name) and (node.id == "sys" or node.id.lstrip("_").isupper())
+        for node in ast.walk(value)
     )
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import Scale, identified, is_law, law_cells
-from relgym.config.constants import ALIKE, ENOUGH, NEARLY_ALL, ORDER_PLANS, SEARCHED_ROWS
+from relgym.config.constants import ALIKE, CHAIN_PLANS, ENOUGH, NEARLY_ALL, SEARCHED_ROWS
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
@@ -174,7 +174,7 @@ def _better(
     seed, support
         As in the configuration.
     """
-    for scale, (terms, sample, draws) in itertools.product(scales, ORDER_PLANS):
+    for scale, (terms, sample, draws) in itertools.product(scales, CHAIN_PLANS):
         rng = np.random.default_rng([seed, len(y)])
         found = yield from consensus.steps(
             x,
