@@ -165,6 +165,21 @@ class OnlineRidge:
                 found[k] = in_order((off * in_order(half * off[:, None]))[:, None])[0]
         return np.where(found >= 0.0, found, np.inf) + 1.0 / max(self.rows, 1)
 
+    def without(
+        self, x: NDArray[np.float64], y: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Responses and leverage of rows that the weights come from, each as if it hadn't been learned.
+
+        A row with leverage h takes the share h of what it misses into the weights, so that without it 1 / (1 - h) times
+        as much is missed, and it lies h / (1 - h) far from the rest (PRESS: Allen 1974). As for all, cost O(d^2) a row.
+        """
+        off = x - self.mean
+        leverage = (np.einsum("ij,jk->ik", off, self.spread) * off).sum(axis=1) + 1.0 / max(self.rows, 1)
+        leverage = np.minimum(np.maximum(leverage, 0.0), 1.0 - 1.0 / max(self.rows, 2))
+        rest = 1.0 - leverage
+        said = self.weights[:, 0] + np.einsum("ij,rj->ir", x, self.weights[:, 1:])
+        return y - (y - said) / rest[:, None], leverage / rest
+
     def _halved(self) -> NDArray[np.float64]:
         """Entries of `spread` on and above the diagonal, those above it twice, by the second column, then the first."""
         if self._half[0] is not self.spread:

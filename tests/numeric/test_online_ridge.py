@@ -200,3 +200,37 @@ def test_sums_in_order_are_those_of_a_loop(shape: tuple[int, int]) -> None:
         expected = expected + row
     for laid in (terms, np.asfortranarray(terms)):
         assert in_order(laid).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("columns", [1, 4])
+def test_a_row_that_was_left_out_is_missed_as_if_it_had_never_come(columns: int) -> None:
+    rng = np.random.default_rng(columns)
+    x, y = rng.normal(size=(60, columns)), rng.normal(size=(60, 2))
+    x[0] *= 4.0  # far out, where it matters
+    whole = OnlineRidge(columns, due=1000)
+    for row, each in zip(x, y, strict=True):
+        whole.add(row, each)
+    whole.solve()
+    said, leverage = whole.without(x, y)
+    for k in range(60):
+        rest = OnlineRidge(columns, due=1000)
+        for i in range(60):
+            if i != k:
+                rest.add(x[i], y[i])
+        rest.solve()
+        np.testing.assert_allclose(said[k], rest.predict(x[k : k + 1])[0], atol=0.05)
+        np.testing.assert_allclose(leverage[k], rest.leverage(x[k : k + 1])[0], rtol=0.1)
+
+
+def test_what_nothing_else_tells_is_not_known_without_it() -> None:
+    """A row that alone has a column: without it nothing would have been learned of that."""
+    ridge, x, y = OnlineRidge(2), np.zeros((50, 2)), np.zeros((50, 1))
+    x[:, 0] = np.arange(50.0)
+    x[7, 1], y[7] = 1.0, 5.0
+    for row, each in zip(x, y, strict=True):
+        ridge.add(row, each)
+    ridge.solve()
+    said, leverage = ridge.without(x, y)
+    assert abs(ridge.predict(x[7:8])[0, 0]) > 2.0
+    assert abs(said[7, 0]) < 0.5
+    assert leverage[7] > 0.4

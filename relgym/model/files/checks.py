@@ -48,6 +48,7 @@ from relgym.model.files.format import (
     ModeRecord,
     PairRecord,
     PropertyRecord,
+    RegressionRecord,
     ScreenRecord,
     StopRecord,
     TableRecord,
@@ -804,7 +805,32 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
             fits = np.isfinite(arrays[name]).all() and (arrays[name] >= 0.0).all()
             _require(fits, f"history: {name}", "expected mean squares")
             names.add(name)
+        names |= _check_remembered(regression, arrays, f"regression{k}")
     return names
+
+
+def _check_remembered(regression: RegressionRecord, arrays: _Arrays, at: str) -> set[str]:
+    """Names of the arrays of rows that a regression remembers, which earlier files don't say."""
+    names = [f"{at}.{part}" for part in ("columns", "responses", "count", "gone_over", "left_out")]
+    if not any(name in arrays for name in names):
+        return set()
+    columns, responses, count, gone_over, left_out = names
+    rows = _rows(arrays, columns, "float64", (None, len(regression.names)))
+    known = len(regression.ridges[0][2]) if regression.ridges else 0
+    _rows(arrays, responses, "float64", (rows, known))
+    for name in (columns, responses):
+        _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+    for name in (count, gone_over):
+        _rows(arrays, name, "int64", (2,))
+    seen, every = arrays[count].tolist()
+    fits = every > 0 and rows == -(-seen // every)
+    _require(fits, f"history: {count}", "expected one of so many rows to be remembered")
+    over, rows_before = arrays[gone_over].tolist()
+    _require(0 <= over <= rows_before <= rows, f"history: {gone_over}", "expected numbers of rows, in order")
+    _rows(arrays, left_out, "float64", (len(RATES) + 1, len(regression.targets)))
+    fits = np.isfinite(arrays[left_out]).all() and (arrays[left_out] >= 0.0).all()
+    _require(fits, f"history: {left_out}", "expected sums of squares")
+    return set(names)
 
 
 _TABLE: Final = ("x", "signature", "stratum", "bodies", "serial")

@@ -9,9 +9,13 @@ columns it has. So each word counts as far as its leverage h allows: first that 
 regression's, then that of products. At a squared distance q = h n / d (n rows of d columns; 1 in the mean), which of
 fewer rows than columns is h, a word counts for 1 / (1 + k q), and those before it for the rest: by k a misfit outgrows
 what the word explains (shrinkage: James & Stein 1961; other slopes suit other places). How k does is measured, target
-by target, on what came before it was learned. But far rows are few and come one after the other, so what was best of
-them needn't be of the next ones: all of some k (`RATES`) have a say, with weights that fall exponentially with what is
-left by them, over n rows by the square root of n, as is best whatever comes (Cesa-Bianchi & Lugosi 2006, §2.3).
+by target: on what came before it was learned, since the next episode, too, may lead where none was; and of the linear
+regression as much on rows that are remembered, each as if it hadn't been learned (`OnlineRidge.without`), since more is
+known now than when most of them came. Products explain a row that was left out by those next to it. But far rows are
+few and come one after the other, so what was best of them needn't be of the next ones: all of some k (`RATES`) have a
+say, with weights that fall exponentially with what is left by them, over n rows by the square root of n, as is best
+whatever comes (Cesa-Bianchi & Lugosi 2006, §2.3). And what suits most targets of a type is likelier to suit one more of
+them: a rate's weight is multiplied by the say that it has in the others' mean (empirical Bayes: Robbins 1956).
 """
 
 from __future__ import annotations
@@ -26,8 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
-from relgym.config.constants import BEYOND, FIRST, SUMMABLE
+from relgym.config.constants import BEYOND, FIRST, MEMORY, ROUNDS, SUMMABLE
 from relgym.numeric.online_ridge import OnlineRidge
+from relgym.numeric.spaced_rows import SpacedRows
 from relgym.program.records import RATES
 from relgym.scene.objects import TASK
 
@@ -86,6 +91,11 @@ class Regression:
         # doesn't count; and how far each rate has a say.
         self._left = np.zeros((len(KINDS), len(RATES) + 1, 0))
         self._say = np.zeros((len(KINDS), len(RATES), 0))
+        # Rows to leave out of the linear one, how many of them have been since it was solved, of how many, and the sum
+        # of what was left of these.
+        self._rows = SpacedRows()
+        self._gone_over = self._rows_before = 0
+        self._left_out = np.zeros((len(RATES) + 1, 0))
         self._places: dict[int, tuple[SlotSignature, NDArray[np.intp] | None]] = {}
         self._texts: dict[int, tuple[NDArray[np.float32], str]] = {}  # see `_text`
 
@@ -109,20 +119,27 @@ class Regression:
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
         missing = len(y) - self._range.shape[1]
         if missing:
-            self._range, self._left, self._say = (
+            self._range, self._left, self._say, self._left_out = (
                 np.pad(each, ((0, 0),) * (each.ndim - 1) + ((0, missing),))
-                for each in (self._range, self._left, self._say)
+                for each in (self._range, self._left, self._say, self._left_out)
             )
             self._say[:, 0, -missing:] = 1.0  # all of a word counts
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
             before = self._ridges[0].weights
             self._compare(x, y)
-            self._add(x, y)
-            return self._ridges[0].weights is not before
+            if not self._add(x, y):
+                return False
+            first = self._ridges[0]
+            if first.weights is not before:
+                self._begin_leaving_out()
+                return True
+            self._leave_out(max(1, first.due - first.rows))
+            return False
         self._waiting.append((x, y))
         if len(self._waiting) == FIRST:
             self._begin()
+            self._begin_leaving_out()
         return bool(self._ridges)
 
     def record(self, target: str) -> tuple[float, float, float] | None:
@@ -145,8 +162,14 @@ class Regression:
 
     def settle(self) -> None:
         """Solve for all rows that there are; meanwhile weights lag by a tenth of them."""
+        if not self._ridges:
+            return
+        before = self._ridges[0].weights
         for ridge in self._ridges:
             ridge.solve()
+        if self._ridges[0].weights is not before:
+            self._begin_leaving_out()
+        self._leave_out(1)
 
     def _begin(self) -> None:
         x = np.array([row for row, _ in self._waiting])
@@ -168,25 +191,51 @@ class Regression:
             return
         trials = self._ridges[0].rows - FIRST + 1
         late = min(1.0, 2.0 / trials)  # each counts in proportion to its number
-        whole = np.zeros(len(y))
         with np.errstate(over="ignore"):
-            far = leverage[0] * self._growth()
-        for kind, (word, q) in enumerate(zip(found[0, : len(self._ridges)], far.tolist(), strict=False)):
+            far = leverage * self._growth()
+        whole = np.zeros_like(y)
+        for kind, (word, q) in enumerate(zip(found[0, : len(self._ridges)], far[0], strict=False)):
             known, left = np.isfinite(word), self._left[kind]
             more = np.where(known, word - whole, 0.0)
-            shares = np.array([*(1.0 / (1.0 + rate * q) for rate in RATES), 0.0])
-            size = np.minimum(np.abs(whole + shares[:, None] * more - y), np.sqrt(SUMMABLE))
-            left += np.where(known, late * (np.square(size) - left), 0.0)
+            squares = _squares(y[None], whole, more[None], np.array([q]))
+            left += np.where(known, late * (squares - left), 0.0)
             whole = whole + _counted(self._say[kind], q) * more
-            bits = np.log2(np.maximum(left, math.ulp(0.0)))
-            say = np.exp2(0.5 * math.sqrt(trials) * (bits.min(axis=0) - bits))
-            self._say[kind] = (say / say.sum(axis=0))[:-1]
 
-    def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> None:
+    def _begin_leaving_out(self) -> None:
+        """The weights are new: what is left of the rows that they come from isn't known of any of them."""
+        self._rows.thin(2 * MEMORY)
+        self._gone_over, self._rows_before = 0, len(self._rows)
+        self._left_out[:] = 0.0
+
+    def _leave_out(self, steps: int) -> None:
+        """Leave out some rows, so many that all are gone over in as many steps; then the rates have a new say."""
+        begin, first = self._gone_over, self._ridges[0]
+        self._gone_over = end = begin - (begin - self._rows_before) // steps
+        if begin == end:
+            return
+        y = self._rows.responses[begin:end]
+        word, leverage = first.without(self._rows.columns[begin:end], y)
+        least, most = self._bounds()[:, : y.shape[1]]
+        far = leverage * self._growth()[0]
+        self._left_out[:, : y.shape[1]] += _squares(y, 0.0, np.clip(word, least, most), far) * len(y)
+        if end == self._rows_before:
+            # Each row is tried twice: before it was learned, and left out of all.
+            self._say[0] = _says(self._left[0] + self._left_out / end, end)
+            trials = first.rows - FIRST
+            for kind in range(1, len(self._ridges) if trials else 1):
+                self._say[kind] = _says(self._left[kind], trials)
+
+    def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
+        """Learn an example; whether that is one with numbers of which sums are finite."""
         with np.errstate(over="ignore"):  # what isn't finite is left out
             shown = self._shown(self._scaled(x[None]))
+        before = self._ridges[0].rows
         for ridge, columns in zip(self._ridges, shown, strict=False):
             ridge.add(columns[0], y)
+        taken = self._ridges[0].rows > before
+        if taken:
+            self._rows.add(shown[0][0], y)
+        return taken
 
     def _scaled(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         return (x - self._centre) / self._scale
@@ -321,6 +370,10 @@ class Regression:
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Sums that further learning adds to."""
         found: dict[str, NDArray[Any]] = {"left": self._left.reshape(-1, len(self.targets))}
+        if len(self._rows):
+            found |= self._rows.to_arrays()
+            found["gone_over"] = np.array([self._gone_over, self._rows_before], dtype=np.int64)
+            found["left_out"] = self._left_out
         for k, ridge in enumerate(self._ridges):
             arrays = ridge.to_arrays()
             found |= {f"{name}{k}": arrays[name] for name in ("gram", "moments", "squares")}
@@ -347,6 +400,11 @@ class Regression:
         self._say = np.ascontiguousarray(say.transpose(0, 2, 1))
         left = arrays.get("left", np.zeros((len(KINDS) * (len(RATES) + 1), count)))
         self._left = left.reshape(len(KINDS), -1, count).copy()
+        self._left_out = np.zeros((len(RATES) + 1, count))
+        if "columns" in arrays:
+            self._rows = SpacedRows.restored(arrays)
+            self._gone_over, self._rows_before = arrays["gone_over"].tolist()
+            self._left_out = arrays["left_out"].copy()
         for ridge in self._ridges:
             ridge.spread = np.zeros_like(ridge.spread)
         for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
@@ -360,6 +418,41 @@ def _counted(say: NDArray[np.float64], far: NDArray[np.float64] | float) -> NDAr
     for weight, rate in zip(say[1:], RATES[1:], strict=True):
         found = found + weight / (1.0 + rate * far)
     return found
+
+
+def _squares(
+    y: NDArray[np.float64],
+    whole: NDArray[np.float64] | float,
+    more: NDArray[np.float64],
+    far: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Mean squares left of n rows where a word adds to those before it by each of the rates, and not at all.
+
+    Shape ``(rates + 1, targets)``; not all too large.
+    """
+    shares = np.array([*(1.0 / (1.0 + rate * far) for rate in RATES), np.zeros_like(far)])
+    missed = np.minimum(np.abs(whole + shares[:, :, None] * more - y), np.sqrt(SUMMABLE))
+    found: NDArray[np.float64] = np.square(missed).mean(axis=1)
+    return found
+
+
+def _says(left: NDArray[np.float64], rows: int) -> NDArray[np.float64]:
+    """How far each rate has a say for each target, shape ``(rates, targets)``, by what is left by each, and by none."""
+    bits, moves = np.log2(np.maximum(left, math.ulp(0.0))), left[-1] > 0.0
+    own = 0.5 * math.sqrt(max(rows, 1)) * (bits.min(axis=0) - bits)
+    say = _shared(own)
+    for _ in range(ROUNDS):
+        others = np.where(moves, say, 0.0)
+        others = others.sum(axis=1)[:, None] - others
+        say = _shared(own + np.log2(np.maximum(others, 0.0) + 1.0))
+    return say[:-1]
+
+
+def _shared(bits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shares of one, by bits, along the first axis."""
+    weights: NDArray[np.float64] = np.exp2(bits - bits.max(axis=0))
+    shares: NDArray[np.float64] = weights / weights.sum(axis=0)
+    return shares
 
 
 @cache

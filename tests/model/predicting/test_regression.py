@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from points import schema_of, transitions
 
+from relgym.config.constants import FIRST, ROUNDS
 from relgym.model.learning.fitting import compare_and_learn
-from relgym.model.predicting.regression import FIRST, Regression, _unpacked
+from relgym.model.predicting.regression import Regression, _says, _unpacked
 from relgym.model.world_model import WorldModel
 from relgym.program.records import RATES
 from relgym.scene.objects import Transition
@@ -102,20 +103,61 @@ def test_words_count_as_far_as_their_leverage_allows() -> None:
         assert said[k, 0] == pytest.approx(linear + (own[k, 1, 0] - linear) / (1.0 + 64.0 * second))
 
 
-def test_what_left_least_has_most_to_say_by_hand() -> None:
-    """Over n rows with weights that fall by the square root of n: of 4 trials as the mean square."""
+def test_what_each_would_have_left_of_what_came_by_hand() -> None:
     found = taught(FIRST + 3)
     x, y = np.array([3.0, 1.0, 2.0]), np.array([1.5, 0.5])
     before = found._left.copy()
     words, leverage = found._said(x[None])
     found._compare(x, y)
-    q = leverage[0, 0] * found._ridges[0].rows / 3
-    shares = np.array([*(1.0 / (1.0 + rate * q) for rate in RATES), 0.0])
-    left = before[0] + 0.5 * (np.square(shares[:, None] * words[0, 0] - y) - before[0])  # twice one in four
-    np.testing.assert_allclose(found._left[0], left)
-    say = (1.0 / left) / (1.0 / left).sum(axis=0)
-    np.testing.assert_allclose(found._say[0], say[:-1])
-    assert (found._say.sum(axis=1) < 1.0).all()  # that nothing changes has a say, too
+    near, far = leverage[0] * found._growth()
+    shares = np.array([[*(1.0 / (1.0 + rate * q) for rate in RATES), 0.0] for q in (near, far)])
+    missed = shares[0][:, None] * words[0, 0] - y
+    np.testing.assert_allclose(found._left[0], before[0] + 0.5 * (missed**2 - before[0]))  # twice one in four
+    linear = words[0, 0] * (found._say[0] * shares[0][:-1, None]).sum(axis=0)
+    missed = linear + shares[1][:, None] * (words[0, 1] - linear) - y
+    np.testing.assert_allclose(found._left[1], before[1] + 0.5 * (missed**2 - before[1]))
+
+
+def test_what_the_linear_one_leaves_is_told_by_leaving_rows_out() -> None:
+    """Of all rows that the weights come from, by the time that there are to be new weights."""
+    found, rng, n = Regression(3), np.random.default_rng(3), FIRST + 7
+    rows = rng.normal(size=(n, len(SIGNATURE.columns)))
+    moved = np.array([rows[:, SIGNATURE.column(0, "x")] ** 2, rows[:, SIGNATURE.column(1, "a")] ** 3]).T
+    for row, (x, y) in zip(rows, moved.tolist(), strict=True):
+        found.learn_one(SIGNATURE, row, {"x": x, "y": y})
+    ridge = found._ridges[0]
+    assert (ridge.rows, ridge.due, found._gone_over) == (n, n + 1, FIRST)
+    found.settle()
+    said, leverage = ridge.without(found._scaled(rows[:, found._columns(SIGNATURE)]), moved)
+    said, q = np.clip(said, *found._bounds()), leverage[:, None] * n / 3
+    left = [np.square(said / (1.0 + rate * q) - moved).mean(axis=0) for rate in RATES]
+    left.append(np.square(moved).mean(axis=0))
+    np.testing.assert_allclose(found._left_out / n, left)
+    np.testing.assert_allclose(found._say[0], _says(found._left[0] + left, n))  # each row is tried twice
+
+
+def test_who_leaves_least_has_most_to_say_and_more_where_others_agree_by_hand() -> None:
+    """Over n rows with weights that fall by the square root of n: of 4 rows as the mean square."""
+    left = np.full((len(RATES) + 1, 3), 4.0)
+    left[0, 0], left[1, 0] = 1.0, 2.0
+    left[:, 2] = 0.0  # what never changed has no say in what others do
+    own = (1.0 / left[:, :1]) / (1.0 / left[:, :1]).sum()
+    level = np.full((len(RATES) + 1, 1), 1.0 / (len(RATES) + 1))
+    first, second = own, level
+    for _ in range(ROUNDS):
+        first, second = own * (1.0 + second), level * (1.0 + first)
+        first, second = first / first.sum(), second / second.sum()
+    np.testing.assert_allclose(_says(left, 4)[:, :2], np.concatenate([first, second], axis=1)[:-1])
+
+
+def test_settled_all_rows_are_gone_over_once() -> None:
+    found = taught(FIRST + 30)
+    assert found._gone_over < len(found._rows)
+    found.settle()
+    assert found._gone_over == found._rows_before == len(found._rows) == FIRST + 30
+    left, say = found._left_out.copy(), found._say.copy()
+    found.settle()
+    assert left.tobytes() == found._left_out.tobytes() and say.tobytes() == found._say.tobytes()
 
 
 def test_all_of_a_word_counts_before_it_was_held_against_anything() -> None:
