@@ -16,13 +16,19 @@ approximation how far from what it was made of it is asked; in those of its winn
   mostly changes;
 - the *interval* is the 95 % quantile of errors, of order statistics (split conformal prediction, Vovk et al. 2005).
 
+Who is right less often than nearly always in a cell is an approximation there, whose value is one of many: another
+one speaks who leaves less in all cells together, by `EVIDENCE` bits; and if it leaves nearly all of what saying that
+nothing changes does, it says no more than that.
+
 Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
-law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was
-believed twice and failed, until it was right twice as long: an epidemic ends, and the next one comes. Who makes none is
-known by all its values, whether it spoke or not; of those that are fitted to more and more, late ones count for more.
-Where it had none yet, all cells together tell whether it speaks. A new mode speaks at once if others were right in what
-they said of changes, laws explain what is seen, and it is told from all others without an error and scatters by less
-than what comes out right may be off; else it is to prove itself first.
+law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was right
+more often than not before, for that one comes through calm times; nor who was believed twice and failed, until it was
+right twice as long: an epidemic ends, and the next one comes. What others leave in the cell counts for few trials then,
+so that they are compared by the same ones. Who makes none is known by all its values, whether it spoke or not. Most
+learn more and more, so late squares count for more, and late hits of who is fitted. Where somebody had no value yet,
+all cells together tell whether it speaks. A new mode speaks at once if others were right in what they said of changes,
+laws explain what is seen, and it is told from all others without an error and scatters by less than what comes out
+right may be off; else it is to prove itself first.
 
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
@@ -51,7 +57,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.config.constants import COVERED, EVIDENCE, FEW, MEMORY, NEARLY_ALL, OCTAVE, SUMMABLE
+from relgym.config.constants import COVERED, EVIDENCE, FEW, MAJORITY, MEMORY, NEARLY_ALL, OCTAVE, SUMMABLE
 from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_REGRESSION, OF_WINNER
 
 __all__ = [
@@ -73,8 +79,9 @@ _KNOWN: Final = (REGRESSION, PERSISTENCE)
 """What anybody would try first."""
 
 _FITTED: Final = (GUESS, REGRESSION)
-"""Who errs the less the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i,
-as least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials."""
+"""Who hits the more the more was learned from: of n trials the i-th counts for nearly (i / n)^2. What falls as c / i,
+as least squares' part of the errors does, is taken for 1.5 c / n then; the variance is that of 5 n / 9 trials. Squares
+of all count so, for what is compared is to be of the same trials."""
 
 _VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 """Who makes no claims."""
@@ -241,7 +248,9 @@ class _Record:
         # Hits come in runs where little happens: what was doubted is believed after more of them; what came and went
         # twice comes and goes.
         ended = (
-            before > 0.0 and bits >= EVIDENCE and (not hit or self.run >= max(FEW, 2.0 * min(self.runs[4:])))
+            before > 0.0
+            and bits >= EVIDENCE
+            and (not hit or (share <= MAJORITY and self.run >= max(FEW, 2.0 * min(self.runs[4:]))))
         )
         if ended:  # a run of hits begins with the miss that it follows: what failed once isn't right always
             self.trials, self.hits = float(abs(self.run) + hit), float(max(self.run, 0))
@@ -332,7 +341,7 @@ class _Cell:
             record = self.records[expert] = _Record()
         if _makes_claims(expert):
             if record.count(error, within, times):
-                self.squares[expert] = [0.0, 0.0, 0.0]
+                self._restart(expert)
             return
         record.add(error <= within, times, fitted=expert in _FITTED)
         if speaks:
@@ -344,12 +353,12 @@ class _Cell:
         for expert in {OWN, self.speaker, *_VALUES}:
             self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker, spoke))
         base = errors[PERSISTENCE] ** 2
-        for expert, (sums, error) in enumerate(zip(self.squares, errors, strict=True)):
+        for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
                 if sums[0] >= MEMORY:
                     sums[:] = [0.5 * s for s in sums]
-                # Of who is fitted the latest of n trials counts for two more, and those before for less: (i / n)^2.
-                more = min(2.0, sums[0] / times) if expert in _FITTED else 0.0
+                # The latest of n trials counts for two more, and those before for less: (i / n)^2.
+                more = min(2.0, sums[0] / times)
                 kept = 1.0 - more * times / sums[0] if more else 1.0
                 late = (1.0 + more) * times
                 sums[0] += times
@@ -363,6 +372,13 @@ class _Cell:
             if self.speaker in _VALUES:
                 self.records[self.speaker].errors = {}
             self.speaker = best
+
+    def _restart(self, expert: int) -> None:
+        """An expert is another one now; the rest are compared with it by what comes from now on, nearly."""
+        self.squares[expert] = [0.0, 0.0, 0.0]
+        for sums in self.squares:
+            share = min(1.0, EVIDENCE / sums[0]) if sums[0] else 0.0
+            sums[:] = [share * each for each in sums]
 
     @classmethod
     def united(cls, cells: Sequence[_Cell], experts: int) -> _Cell:
@@ -418,12 +434,25 @@ class _Cell:
         least = min(left.values())
         return next((k for k in (OWN, PERSISTENCE) if left.get(k) == least), min(left, key=left.__getitem__))
 
-    def lead(self, expert: int, other: int) -> float:
-        """Bits by which one expert codes the trials better than another one (normal errors of unknown size)."""
-        trials = min(self.squares[expert][0], self.squares[other][0] or math.inf)
-        ratio = self.left(other) / self.left(expert)
+    def lead(self, expert: int, other: int, heard: _Cell | None = None) -> float:
+        """Bits by which one expert codes the trials better than another one does, here or in another cell.
+
+        Of normal errors of unknown size. Of other trials it is to leave less both in squares and as a share of what
+        saying that nothing changes leaves.
+        """
+        there = heard or self
+        trials = min(self.squares[expert][0], there.squares[other][0] or math.inf)
+        ratio = there.left(other) / self.left(expert)
+        if heard is not None:
+            (n, own, _), (m, others, _) = self.squares[expert], heard.squares[other]
+            ratio = min(ratio, max(others * n, math.ulp(0.0)) / max(own * m, math.ulp(0.0)))
         most = sys.float_info.max
         return 0.5 * trials * math.log2(min(max(ratio, 1.0 / most), most))
+
+    def rough(self, speaker: int) -> bool:
+        """Whether a mode or a law isn't right nearly always: an approximation, whose value is one of many."""
+        known = self.records.get(speaker) if _makes_claims(speaker) else None
+        return known is not None and known.trials >= FEW and known.mean(0.5) < NEARLY_ALL
 
     def undecided(self, expert: int, other: int) -> bool:
         """Whether an expert doesn't lead another one by enough; one that was never heard, if not even persistence."""
@@ -633,6 +662,9 @@ class Calibration:
                 if k != speaker and (_only_values(speaker, k) or trusted.undecided(speaker, k))
             ]
             usual, wider = self._usual(known[0], able, speaker) if others else (speaker, trusted)
+            if usual not in others and trusted.rough(speaker):
+                usual, wider = self._instead(able, speaker, trusted), self._whole()
+                others = [usual] if usual != speaker else []
             if usual in others:
                 speaker = usual
                 if not trusted.squares[usual][0]:  # never heard here
@@ -696,10 +728,18 @@ class Calibration:
             return speaker, winner
         return self._anywhere(able, speaker), self._whole()
 
-    def _anywhere(self, able: tuple[int, ...], speaker: int) -> int:
-        """Who needs no winner and codes better than who would speak, by enough, in all cells together."""
-        best = self._whole().best([k for k in able if k not in (OWN, LATEST)])
-        return best if self._whole().lead(best, speaker) >= EVIDENCE else speaker
+    def _anywhere(self, able: tuple[int, ...], speaker: int, heard: _Cell | None = None) -> int:
+        """Who needs no winner and codes better in all cells than who would speak, there or where he was heard."""
+        whole = self._whole()
+        best = whole.best([k for k in able if k not in (OWN, LATEST)])
+        return best if whole.lead(best, speaker, heard) >= EVIDENCE else speaker
+
+    def _instead(self, able: tuple[int, ...], speaker: int, heard: _Cell) -> int:
+        """Who speaks where an approximation would: that one, unless another codes better, by enough, in all cells."""
+        if heard.left(speaker) < NEARLY_ALL:
+            return self._anywhere(able, speaker, heard)
+        best = self._anywhere(able, PERSISTENCE)  # it has said no more than that nothing changes
+        return speaker if best == PERSISTENCE else best
 
     def _vouches(self, family: _Cell | None, bits: float, key: Key) -> bool:
         """Whether modes, or laws, were right often enough in what they said of changes for a new one to speak.
@@ -968,7 +1008,7 @@ class Calibration:
             own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
             if own is not None and own.hits < own.trials and own.even() < 1.0 - self.allowed:
                 cell.records[OWN] = _Record(revised=own.revised + 1)
-                cell.squares[OWN] = [0.0, 0.0, 0.0]
+                cell._restart(OWN)
                 cell._sure = None
         self._changed()
 
