@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from relgym.config.constants import MORE_ROOM, SUMMABLE
-from relgym.numeric.online_ridge import OnlineRidge, _inverse, in_order
+from relgym.numeric.online_ridge import OnlineRidge, _sweep, in_order
 
 
 def rows(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -184,9 +184,34 @@ def test_the_inverse_is_one_whatever_solves_it(columns: int) -> None:
     rng = np.random.default_rng(columns)
     x = rng.normal(size=(3 * columns, columns)) * np.exp(rng.normal(size=columns))
     matrix = x.T @ x / max(1, len(x)) + 1e-3 * np.eye(columns)
-    found = _inverse(matrix)
+    found, other = matrix.copy(), matrix.copy(order="F")
+    for part in (range(columns // 3), range(columns // 3, columns)):
+        _sweep(found, part)
+    _sweep(other, range(columns))
     assert np.abs(found @ matrix - np.eye(columns)).max(initial=0.0) < 1e-10
-    assert (found == _inverse(matrix.copy(order="F"))).all()  # however it lies in memory
+    assert (found == other).all()  # however it lies in memory, and in whatever pieces it was done
+
+
+def test_it_is_solved_in_pieces_of_the_rows_that_it_was_begun_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first time at once, for nothing is known before; then four columns of eight a row."""
+    monkeypatch.setattr("relgym.numeric.online_ridge.SEARCHED_CELLS", 4 * 4 * 4)
+    rng = np.random.default_rng(5)
+    x, y = rng.normal(size=(60, 8)), rng.normal(size=(60, 2))
+    ridge, whole = OnlineRidge(8, due=40), OnlineRidge(8, due=100)
+    for k in range(45):
+        ridge.add(x[k], y[k])
+        whole.add(x[k], y[k])
+        assert ridge.worked == (8 * 16 if k == 39 else 4 * 16 if k == 44 else 0)
+    whole.solve()
+    first = ridge.weights
+    saved = OnlineRidge.restored(ridge.rows, ridge.due, ridge.to_arrays())
+    for each in (ridge, saved):
+        each.add(x[45], np.append(y[45], 3.0))  # a response that is new
+        assert each.weights[:2].tobytes() == whole.weights.tobytes() != first.tobytes()
+        assert each.weights.shape == (3, 9) and not each.weights[2].any()
+        assert "begun" not in each.to_arrays()
+    ridge.solve()
+    assert ridge.weights[:2].tobytes() != whole.weights.tobytes()  # of all rows
 
 
 @pytest.mark.parametrize(

@@ -793,6 +793,7 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
                 _rows(arrays, name, "float64", shape)
                 _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
                 names.add(name)
+            names |= _check_begun(width, len(weights), arrays, f"regression{k}", number)
             name = f"regression{k}.squares{number}"
             if name in arrays:  # which earlier files don't say
                 _rows(arrays, name, "float64", (len(weights),))
@@ -807,6 +808,25 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
             names.add(name)
         names |= _check_remembered(regression, arrays, f"regression{k}")
     return names
+
+
+def _check_begun(width: int, most: int, arrays: _Arrays, at: str, number: int) -> set[str]:
+    """Names of the arrays that a solution was begun from, if one was."""
+    place, gram, moments, squares = (
+        f"{at}.{part}{number}" for part in ("begun", "begun_gram", "begun_moments", "begun_squares")
+    )
+    if not any(name in arrays for name in (place, gram, moments, squares)):
+        return set()
+    _rows(arrays, place, "int64", (2,))
+    _rows(arrays, gram, "float64", (width, width))
+    known = _rows(arrays, moments, "float64", (None, width))
+    _rows(arrays, squares, "float64", (known,))
+    for name in (gram, moments, squares):
+        _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+    rows, swept = arrays[place].tolist()
+    _require(rows > 0 and 0 <= swept < width, f"history: {place}", "expected rows, and columns that are done")
+    _require(known <= most, f"history: {moments}", "expected sums of some of the targets")
+    return {place, gram, moments, squares}
 
 
 def _check_remembered(regression: RegressionRecord, arrays: _Arrays, at: str) -> set[str]:

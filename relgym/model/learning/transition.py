@@ -253,9 +253,11 @@ def _learn_object(
                 table, row, y, situation.signature, example, budget, weights[target.property]
             )
             reports[name, target.property] = report
-    if rough and parts.regressions[type_name].learn_one(situation.signature, x, changes):
-        _tell_regressed(parts, type_name)
-        budget.spend(parts.regressions[type_name].solving_cells)
+    if rough:
+        regression = parts.regressions[type_name]
+        if regression.learn_one(situation.signature, x, changes):
+            _tell_regressed(parts, type_name)
+        budget.spend(regression.worked)
 
 
 def _tell_regressed(parts: Parts, type_name: str) -> None:

@@ -75,12 +75,14 @@ class Regression:
         Properties predicted, in the order of the responses.
     seen
         Number of examples.
+    worked
+        Cells that solving took with the latest example.
     """
 
     def __init__(self, most: int) -> None:
         self.names: tuple[str, ...] = ()
         self.targets: list[str] = []
-        self.seen = 0
+        self.seen = self.worked = 0
         self._most = most
         self._ridges: list[OnlineRidge] = []
         self._waiting: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
@@ -109,6 +111,7 @@ class Regression:
 
         Returns whether that changed the weights.
         """
+        self.worked = 0
         if not self.names:
             self.names = _names(signature)
         places = self._columns(signature)
@@ -126,16 +129,15 @@ class Regression:
             self._say[:, 0, -missing:] = 1.0  # all of a word counts
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
-            before = self._ridges[0].weights
+            first, before = self._ridges[0], [ridge.weights for ridge in self._ridges]
             self._compare(x, y)
             if not self._add(x, y):
                 return False
-            first = self._ridges[0]
-            if first.weights is not before:
+            if first.weights is not before[0]:
                 self._begin_leaving_out()
-                return True
-            self._leave_out(max(1, first.due - first.rows))
-            return False
+            else:
+                self._leave_out(max(1, first.due - first.rows))
+            return any(r.weights is not known for r, known in zip(self._ridges, before, strict=True))
         self._waiting.append((x, y))
         if len(self._waiting) == FIRST:
             self._begin()
@@ -154,11 +156,6 @@ class Regression:
         if not math.isfinite(left):
             return None
         return float(first.rows), first.rows * left, first.rows * float(first.size[k])
-
-    @property
-    def solving_cells(self) -> int:
-        """What solving for weights takes, in cells: of d^3 numbers in a core's cache each costs a quarter of others."""
-        return sum(ridge.columns * (ridge.columns // 2) ** 2 for ridge in self._ridges)
 
     def settle(self) -> None:
         """Solve for all rows that there are; meanwhile weights lag by a tenth of them."""
@@ -232,6 +229,7 @@ class Regression:
         before = self._ridges[0].rows
         for ridge, columns in zip(self._ridges, shown, strict=False):
             ridge.add(columns[0], y)
+            self.worked += ridge.worked
         taken = self._ridges[0].rows > before
         if taken:
             self._rows.add(shown[0][0], y)
@@ -375,8 +373,7 @@ class Regression:
             found["gone_over"] = np.array([self._gone_over, self._rows_before], dtype=np.int64)
             found["left_out"] = self._left_out
         for k, ridge in enumerate(self._ridges):
-            arrays = ridge.to_arrays()
-            found |= {f"{name}{k}": arrays[name] for name in ("gram", "moments", "squares")}
+            found |= {f"{name}{k}": array for name, array in ridge.to_arrays().items() if name != "weights"}
         return found
 
     def restore(self, data: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
@@ -394,6 +391,9 @@ class Regression:
                 # Files of earlier versions don't say it; what was left lately of all changes is as much.
                 before = rows * arrays["left"][len(RATES)] if "left" in arrays else np.zeros(len(weights))
                 parts["squares"] = arrays.get(f"squares{k}", before)
+            begun = {part: f"{part}{k}" for part in ("begun", "begun_gram", "begun_moments", "begun_squares")}
+            if begun["begun"] in arrays:
+                parts |= {part: arrays[name] for part, name in begun.items()}
             self._ridges.append(OnlineRidge.restored(int(rows), int(due), parts))
         count = len(self.targets)
         say = np.array(data["say"], dtype=np.float64).reshape(len(KINDS), count, len(RATES))
