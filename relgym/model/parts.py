@@ -401,11 +401,11 @@ class Parts:
     def _asked(self, regression: Regression, percept: Percept, index: int) -> Regressed | None:
         """What regressions say of an object of n scenes; asked once for all properties."""
         known = percept.regressed.get(index)
-        if known is None or known[0] != regression.seen:
+        if known is None or known[0] != regression.revision:
             signature = percept.situation(index).signature
             # Only present values are read, and of objects alone of their type: their order doesn't matter.
             x = percept.rows(index, percept.vectors, ordered=False)
-            known = percept.regressed[index] = (regression.seen, regression.values(signature, x))
+            known = percept.regressed[index] = (regression.revision, regression.values(signature, x))
         return known[1]
 
     def governs(self, target: Target) -> bool:

@@ -167,7 +167,7 @@ class OnlineRidge:
     def without(
         self, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Responses and leverage of rows that the weights come from, each as if it hadn't been learned.
+        """Responses and leverage of rows that the weights come from, each as if it hadn't been learned; nearly.
 
         A row with leverage h takes the share h of what it misses into the weights, so that without it 1 / (1 - h) times
         as much is missed, and it lies h / (1 - h) far from the rest (PRESS: Allen 1974). As for all, cost O(d^2) a row.
@@ -190,7 +190,8 @@ class OnlineRidge:
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """The sums, which further rows are added to, the weights, and the sums that a solution was begun from."""
         sums = {"gram": self._gram, "moments": self._moments, "squares": self._squares}
-        return {**sums, "weights": self.weights, **({} if self._begun is None else self._begun.to_arrays())}
+        begun = {} if self._begun is None else self._begun.to_arrays()
+        return {**sums, "weights": self.weights, "left": self.left, **begun}
 
     @classmethod
     def restored(cls, rows: int, due: int, arrays: Mapping[str, NDArray[Any]]) -> OnlineRidge:
@@ -199,7 +200,7 @@ class OnlineRidge:
         found = cls(weights.shape[1] - 1)
         found.rows, found._due, found.weights = rows, due, weights.copy()
         found._moments, found._squares = np.zeros_like(weights), np.zeros(len(weights))
-        found.left = np.full(len(weights), np.inf)
+        found.left = arrays.get("left", np.full(len(weights), np.inf)).copy()
         if "gram" in arrays:
             found._gram, found._moments = arrays["gram"].copy(), arrays["moments"].copy()
             found._squares = arrays["squares"].copy()
@@ -296,8 +297,9 @@ class _Solution:
     def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> _Solution:
         """What `to_arrays` wrote; it sweeps out again what was."""
         rows, swept = arrays["begun"].tolist()
-        found = cls(rows, *(arrays[f"begun_{part}"] for part in ("gram", "moments", "squares")))
-        _sweep(found._inverse, range(swept))
+        with np.errstate(all="ignore"):  # of a damaged file nothing comes that is finite, and it is left out
+            found = cls(rows, *(arrays[f"begun_{part}"] for part in ("gram", "moments", "squares")))
+            _sweep(found._inverse, range(swept))
         found._swept = swept
         return found
 

@@ -60,16 +60,22 @@ class SpacedRows:
 
     def add(self, columns: NDArray[np.float64], responses: NDArray[np.float64]) -> None:
         """Take in a row of as many columns as those before, and of as many responses or more."""
+        self.widen(len(responses))
         number, self.seen = self.seen, self.seen + 1
         if number % self.every:
             return
-        room, known = self._responses.shape
-        if self._size == room or len(responses) > known:
-            more = max(FIRST_ROOM, self._size) if self._size == room else 0
-            self._responses = np.pad(self._responses, ((0, more), (0, max(0, len(responses) - known))))
-            self._columns = np.pad(self._columns, ((0, more), (0, len(columns) - self._columns.shape[1])))
+        if self._size == len(self._columns):
+            more = (0, max(FIRST_ROOM, self._size))
+            self._responses = np.pad(self._responses, (more, (0, 0)))
+            self._columns = np.pad(self._columns, (more, (0, len(columns) - self._columns.shape[1])))
         self._columns[self._size], self._responses[self._size, : len(responses)] = columns, responses
         self._size += 1
+
+    def widen(self, responses: int) -> None:
+        """Expect so many responses from now on, if that is more than before: they were 0 in the rows that there are."""
+        missing = responses - self._responses.shape[1]
+        if missing > 0:
+            self._responses = np.pad(self._responses, ((0, 0), (0, missing)))
 
     def thin(self, most: int) -> None:
         """Keep every second row, as often as there are more than so many.

@@ -205,10 +205,12 @@ def test_it_is_solved_in_pieces_of_the_rows_that_it_was_begun_with(monkeypatch: 
     whole.solve()
     first = ridge.weights
     saved = OnlineRidge.restored(ridge.rows, ridge.due, ridge.to_arrays())
+    assert saved.left.tobytes() == ridge.left.tobytes()
     for each in (ridge, saved):
         each.add(x[45], np.append(y[45], 3.0))  # a response that is new
         assert each.weights[:2].tobytes() == whole.weights.tobytes() != first.tobytes()
         assert each.weights.shape == (3, 9) and not each.weights[2].any()
+        assert each.left[:2].tobytes() == whole.left.tobytes() and each.left[2] == np.inf
         assert "begun" not in each.to_arrays()
     ridge.solve()
     assert ridge.weights[:2].tobytes() != whole.weights.tobytes()  # of all rows

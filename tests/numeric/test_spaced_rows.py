@@ -38,6 +38,18 @@ def test_a_response_that_comes_late_was_nothing_before() -> None:
     assert found.responses.tolist() == [[5.0, 0.0], [6.0, 7.0]]
 
 
+@pytest.mark.parametrize("count", [0, 5, 6, 7])
+def test_a_response_is_known_of_all_rows_whether_or_not_its_first_one_is_kept(count: int) -> None:
+    found = came(count, 3, 3)
+    found.add(np.array([0.0, 1.0]), np.array([5.0, 7.0]))
+    assert found.responses.shape == (len(found), 2)
+    found.widen(1)
+    assert found.responses.shape == (len(found), 2)
+    found.widen(3)
+    assert found.responses.shape == (len(found), 3)
+    assert not found.responses[: count // found.every, 1:].any()
+
+
 @pytest.mark.parametrize("count", [0, 7, 40])
 def test_what_was_saved_goes_on_as_if_it_had_not_been(count: int) -> None:
     one = came(count, 10, 5)

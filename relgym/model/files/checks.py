@@ -25,6 +25,7 @@ from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import bind
 from relgym.config import ClassificationConfig, ClusteringConfig, ModelConfig
+from relgym.config.constants import SUMMABLE
 from relgym.errors import ModelFileError
 from relgym.files.reading import StoredArrays
 from relgym.files.records import LARGEST
@@ -793,7 +794,12 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
                 _rows(arrays, name, "float64", shape)
                 _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
                 names.add(name)
-            names |= _check_begun(width, len(weights), arrays, f"regression{k}", number)
+            names |= _check_begun(regression, number, arrays, f"regression{k}")
+            name = f"regression{k}.left{number}"
+            if name in arrays:  # which earlier files don't say
+                _rows(arrays, name, "float64", (len(weights),))
+                _require((arrays[name] >= 0.0).all(), f"history: {name}", "expected mean squares")
+                names.add(name)
             name = f"regression{k}.squares{number}"
             if name in arrays:  # which earlier files don't say
                 _rows(arrays, name, "float64", (len(weights),))
@@ -810,8 +816,10 @@ def _check_regression_shapes(body: Body, arrays: _Arrays) -> set[str]:
     return names
 
 
-def _check_begun(width: int, most: int, arrays: _Arrays, at: str, number: int) -> set[str]:
+def _check_begun(regression: RegressionRecord, number: int, arrays: _Arrays, at: str) -> set[str]:
     """Names of the arrays that a solution was begun from, if one was."""
+    seen, _, weights = regression.ridges[number]
+    width = len(weights[0])
     place, gram, moments, squares = (
         f"{at}.{part}{number}" for part in ("begun", "begun_gram", "begun_moments", "begun_squares")
     )
@@ -824,8 +832,9 @@ def _check_begun(width: int, most: int, arrays: _Arrays, at: str, number: int) -
     for name in (gram, moments, squares):
         _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
     rows, swept = arrays[place].tolist()
-    _require(rows > 0 and 0 <= swept < width, f"history: {place}", "expected rows, and columns that are done")
-    _require(known <= most, f"history: {moments}", "expected sums of some of the targets")
+    fits = 0 < rows <= seen and 0 <= swept < width
+    _require(fits, f"history: {place}", "expected rows that came, and columns that are done")
+    _require(known <= len(weights), f"history: {moments}", "expected sums of some of the targets")
     return {place, gram, moments, squares}
 
 
@@ -836,14 +845,17 @@ def _check_remembered(regression: RegressionRecord, arrays: _Arrays, at: str) ->
         return set()
     columns, responses, count, gone_over, left_out = names
     rows = _rows(arrays, columns, "float64", (None, len(regression.names)))
-    known = len(regression.ridges[0][2]) if regression.ridges else 0
-    _rows(arrays, responses, "float64", (rows, known))
+    _require(
+        bool(regression.ridges), f"history: {columns}", "expected a regression that rows are left out of"
+    )
+    _rows(arrays, responses, "float64", (rows, len(regression.ridges[0][2])))
     for name in (columns, responses):
-        _require(np.isfinite(arrays[name]).all(), f"history: {name}", "expected finite numbers")
+        fits = (np.abs(arrays[name]) <= SUMMABLE).all()
+        _require(fits, f"history: {name}", "expected numbers whose squares can be summed")
     for name in (count, gone_over):
         _rows(arrays, name, "int64", (2,))
     seen, every = arrays[count].tolist()
-    fits = every > 0 and rows == -(-seen // every)
+    fits = 0 < seen <= regression.ridges[0][0] and every.bit_count() == 1 and rows == -(-seen // every)
     _require(fits, f"history: {count}", "expected one of so many rows to be remembered")
     over, rows_before = arrays[gone_over].tolist()
     _require(0 <= over <= rows_before <= rows, f"history: {gone_over}", "expected numbers of rows, in order")

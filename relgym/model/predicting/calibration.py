@@ -20,15 +20,15 @@ Who is right less often than nearly always in a cell is an approximation there, 
 one speaks who leaves less in all cells together, by `EVIDENCE` bits; and if it leaves nearly all of what saying that
 nothing changes does, it says no more than that.
 
-Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a
-law that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was right
-more often than not before, for that one comes through calm times; nor who was believed twice and failed, until it was
-right twice as long: an epidemic ends, and the next one comes. What others leave in the cell counts for few trials then,
-so that they are compared by the same ones. Who makes none is known by all its values, whether it spoke or not. Most
-learn more and more, so late squares count for more, and late hits of who is fitted. Where somebody had no value yet,
-all cells together tell whether it speaks. A new mode speaks at once if others were right in what they said of changes,
-laws explain what is seen, and it is told from all others without an error and scatters by less than what comes out
-right may be off; else it is to prove itself first.
+Of who makes claims, a run of hits or of misses that the record calls unlikely by `EVIDENCE` bits ends the record: a law
+that changed is doubted at once, and a mode whose conditions were found is believed at once; but not who was right more
+often than not before, for that one comes through calm times; nor who was believed twice and failed, until it was right
+twice as long: an epidemic ends, and the next one comes. What others leave in the cell counts for few trials then, so
+that they are compared by the same ones, and the cells of the winner tell more until there are enough. Who makes none is
+known by all its values, whether it spoke or not. Most learn more and more, so late squares count for more, and late
+hits of who is fitted. Where somebody had no value yet, all cells together tell whether it speaks. A new mode speaks at
+once if others were right in what they said of changes, laws explain what is seen, and it is told from all others
+without an error and scatters by less than what comes out right may be off; else it is to prove itself first.
 
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
@@ -359,7 +359,7 @@ class _Cell:
                     sums[:] = [0.5 * s for s in sums]
                 # The latest of n trials counts for two more, and those before for less: (i / n)^2.
                 more = min(2.0, sums[0] / times)
-                kept = 1.0 - more * times / sums[0] if more else 1.0
+                kept = max(0.0, 1.0 - more * times / sums[0]) if more else 1.0
                 late = (1.0 + more) * times
                 sums[0] += times
                 sums[1] = kept * sums[1] + late * error * error

@@ -15,7 +15,7 @@ known now than when most of them came. Products explain a row that was left out 
 few and come one after the other, so what was best of them needn't be of the next ones: all of some k (`RATES`) have a
 say, with weights that fall exponentially with what is left by them, over n rows by the square root of n, as is best
 whatever comes (Cesa-Bianchi & Lugosi 2006, §2.3). And what suits most targets of a type is likelier to suit one more of
-them: a rate's weight is multiplied by the say that it has in the others' mean (empirical Bayes: Robbins 1956).
+them: a rate's weight is multiplied by how many of the others have it, and one (empirical Bayes: Robbins 1956).
 """
 
 from __future__ import annotations
@@ -77,12 +77,14 @@ class Regression:
         Number of examples.
     worked
         Cells that solving took with the latest example.
+    revision
+        Another number whenever predictions may be others than before.
     """
 
     def __init__(self, most: int) -> None:
         self.names: tuple[str, ...] = ()
         self.targets: list[str] = []
-        self.seen = self.worked = 0
+        self.seen = self.worked = self.revision = 0
         self._most = most
         self._ridges: list[OnlineRidge] = []
         self._waiting: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
@@ -118,7 +120,7 @@ class Regression:
         if places is None or not 0 < len(places) <= self._most:
             return False
         self.targets += [name for name in changes if name not in self.targets]
-        self.seen += 1
+        self.seen, self.revision = self.seen + 1, self.revision + 1
         x, y = row[places], np.array([changes.get(name, 0.0) for name in self.targets])
         missing = len(y) - self._range.shape[1]
         if missing:
@@ -130,10 +132,11 @@ class Regression:
         self._range = np.stack([np.minimum(self._range[0], y), np.maximum(self._range[1], y)])
         if self._ridges:
             first, before = self._ridges[0], [ridge.weights for ridge in self._ridges]
+            spread = first.spread
             self._compare(x, y)
             if not self._add(x, y):
                 return False
-            if first.weights is not before[0]:
+            if first.spread is not spread:  # weights of a new target are new, too, and no solution
                 self._begin_leaving_out()
             else:
                 self._leave_out(max(1, first.due - first.rows))
@@ -161,12 +164,13 @@ class Regression:
         """Solve for all rows that there are; meanwhile weights lag by a tenth of them."""
         if not self._ridges:
             return
-        before = self._ridges[0].weights
+        before = self._ridges[0].spread
         for ridge in self._ridges:
             ridge.solve()
-        if self._ridges[0].weights is not before:
+        if self._ridges[0].spread is not before:
             self._begin_leaving_out()
         self._leave_out(1)
+        self.revision += 1
 
     def _begin(self) -> None:
         x = np.array([row for row, _ in self._waiting])
@@ -186,7 +190,7 @@ class Regression:
         found, leverage = self._said(x[None])
         if not np.isfinite(leverage).all():  # a gross error, which isn't learned either
             return
-        trials = self._ridges[0].rows - FIRST + 1
+        trials = max(1, self._ridges[0].rows - FIRST + 1)
         late = min(1.0, 2.0 / trials)  # each counts in proportion to its number
         with np.errstate(over="ignore"):
             far = leverage * self._growth()
@@ -215,11 +219,13 @@ class Regression:
         least, most = self._bounds()[:, : y.shape[1]]
         far = leverage * self._growth()[0]
         self._left_out[:, : y.shape[1]] += _squares(y, 0.0, np.clip(word, least, most), far) * len(y)
-        if end == self._rows_before:
+        if end == self._rows_before and end >= min(
+            FIRST, first.rows
+        ):  # of a file of before few rows are remembered
             # Each row is tried twice: before it was learned, and left out of all.
             self._say[0] = _says(self._left[0] + self._left_out / end, end)
             trials = first.rows - FIRST
-            for kind in range(1, len(self._ridges) if trials else 1):
+            for kind in range(1, len(self._ridges) if trials > 0 else 1):
                 self._say[kind] = _says(self._left[kind], trials)
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
@@ -230,6 +236,7 @@ class Regression:
         for ridge, columns in zip(self._ridges, shown, strict=False):
             ridge.add(columns[0], y)
             self.worked += ridge.worked
+        self._rows.widen(len(y))
         taken = self._ridges[0].rows > before
         if taken:
             self._rows.add(shown[0][0], y)
@@ -391,6 +398,8 @@ class Regression:
                 # Files of earlier versions don't say it; what was left lately of all changes is as much.
                 before = rows * arrays["left"][len(RATES)] if "left" in arrays else np.zeros(len(weights))
                 parts["squares"] = arrays.get(f"squares{k}", before)
+                if f"left{k}" in arrays:
+                    parts["left"] = arrays[f"left{k}"]
             begun = {part: f"{part}{k}" for part in ("begun", "begun_gram", "begun_moments", "begun_squares")}
             if begun["begun"] in arrays:
                 parts |= {part: arrays[name] for part, name in begun.items()}

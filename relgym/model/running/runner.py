@@ -169,7 +169,7 @@ class _Reaching:
     regression: Regression
     targets: list[int]
     where: NDArray[np.intp]
-    seen: int = -1
+    revision: int = -1
 
 
 class _Told(NamedTuple):
@@ -257,8 +257,8 @@ class Runner:
         if moved:
             self._space["memory_keys"] = 0  # answers that are remembered were voted for as it was before
         for known in self._regressions:
-            if known.seen != known.regression.seen:
-                known.seen = known.regression.seen
+            if known.revision != known.regression.revision:
+                known.revision = known.regression.revision
                 self._space["numbers"][0, known.where] = known.regression.reach[known.targets]
 
     def _reaches_at(self, places: Sequence[int]) -> list[_Reaching]:

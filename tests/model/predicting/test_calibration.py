@@ -826,6 +826,16 @@ def test_squares_of_many_trials_are_halved() -> None:
     assert found.squares[REGRESSION] == [0.0, 0.0, 0.0]  # had nothing to say
 
 
+@given(trials=st.integers(1, 1000), times=st.integers(1, 1000))
+def test_squares_are_never_below_nothing(trials: int, times: int) -> None:
+    """However many trials one stands for, and though nothing is added to them."""
+    found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
+    errors[OWN] = errors[PERSISTENCE] = 0.0
+    found.squares[OWN] = [float(trials), 8.0, 4096.0]
+    found.count(errors, 0.5, times)
+    assert min(found.squares[OWN]) >= 0.0
+
+
 def test_a_law_that_broke_is_measured_anew() -> None:
     found, errors = _Cell.new(OWN, len(EXPERTS)), [math.nan] * len(EXPERTS)
     errors[PERSISTENCE] = 4.0

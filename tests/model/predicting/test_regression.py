@@ -150,6 +150,44 @@ def test_who_leaves_least_has_most_to_say_and_more_where_others_agree_by_hand() 
     np.testing.assert_allclose(_says(left, 4)[:, :2], np.concatenate([first, second], axis=1)[:-1])
 
 
+@pytest.mark.parametrize("after", [FIRST + 10, 700, 701, 702, 703])
+@pytest.mark.parametrize("wild", [False, True])
+def test_a_target_that_comes_late_is_known_of_all_rows_that_are_left_out(
+    after: int, wild: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether or not its first row is one that is kept, and even if it is none that can be learned."""
+    monkeypatch.setattr("relgym.model.predicting.regression.MEMORY", 50)  # so every eighth row is kept
+    found, rng = taught(after), np.random.default_rng(1)
+    for k in range(20):
+        row = rng.normal(size=len(SIGNATURE.columns))
+        found.learn_one(SIGNATURE, row, {"x": 1.0, "y": 0.5, "late": 1e200 if wild and k == 0 else 2.0})
+        if k in (0, 5):
+            found.settle()
+        arrays = found.to_arrays()
+        assert arrays["responses"].shape == (len(found._rows), 3)
+        assert len(arrays["left0"]) == len(found._ridges[0].weights) == 3
+
+
+def test_settled_predictions_are_others_than_before() -> None:
+    """Though no weight is another one: how far they count is known better."""
+    found = taught(FIRST + 8)  # solved with the latest row
+    before, reach, solved = found.revision, found.reach, found.solved
+    found.settle()
+    assert all(a is b for a, b in zip(solved[0], found.solved[0], strict=True))
+    assert found.revision != before and reach.tobytes() != found.reach.tobytes()
+
+
+def test_gross_errors_among_the_first_are_survived() -> None:
+    found, rng = Regression(320), np.random.default_rng(2)
+    for k in range(FIRST + 20):
+        row = rng.normal(size=len(SIGNATURE.columns))
+        found.learn_one(SIGNATURE, row, {"x": 1e200 if k < 5 else row[0], "y": 0.0})
+        if k == FIRST:
+            found.settle()
+    assert found._ridges[0].rows == FIRST + 15
+    assert (found._left >= 0.0).all() and np.isfinite(found._say).all()
+
+
 def test_settled_all_rows_are_gone_over_once() -> None:
     found = taught(FIRST + 30)
     assert found._gone_over < len(found._rows)
