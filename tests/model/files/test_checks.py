@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from points import schema_of, transitions
 
 from relgym.errors import ModelFileError
 from relgym.files import reading
 from relgym.files.reading import FileLimits
 from relgym.model.files.storage import read_model, write_model
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.world_model import WorldModel
+from relgym.scene.objects import Transition
 
 FILES = Path(__file__).parent / "v1"
 LATER = Path(__file__).parent / "v2" / "ball-calibrated-history"
@@ -289,6 +292,73 @@ def test_a_regression_without_weights_is_refused(name: str, tmp_path: Path) -> N
     write_model(tmp_path / "model", body, arrays)
     with pytest.raises(ModelFileError, match="expected weights of some of the targets"):
         WorldModel.load(tmp_path / "model")
+
+
+def _noisy(steps: int) -> tuple[WorldModel, list[Transition]]:
+    """Of twenty numbers that are noise, whose regression is being solved after 75 steps; and what comes next."""
+    names = tuple(f"x{k}" for k in range(20))
+    rng = np.random.default_rng(0)
+
+    def moved(s: np.ndarray, u: np.ndarray) -> list[float]:
+        return [*rng.normal(size=20).tolist()]
+
+    schema = schema_of(names, ("a",))
+    came = transitions(schema, moved, rng.normal(size=(steps + 12, 20)), rng.normal(size=(steps + 12, 1)))
+    model = WorldModel(schema)
+    for transition in came[:steps]:
+        compare_and_learn(model, transition, model.predict_one(transition.before))
+    return model, came[steps:]
+
+
+@pytest.fixture(scope="module")
+def pending(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pending") / "model"
+    _noisy(75)[0].save(path, history=True)
+    return path
+
+
+def test_a_solution_that_is_pending_goes_on_as_if_never_saved(pending: Path) -> None:
+    model, rest = _noisy(75)
+    again = WorldModel.load(pending)
+    for k, transition in enumerate(rest):
+        found = []
+        for each in (model, again):
+            regression = each._parts.regressions["self"]
+            assert k or "begun1" in regression.to_arrays()
+            compare_and_learn(each, transition, each.predict_one(transition.before))
+            arrays = regression.to_arrays() | {"reach": regression.reach}
+            found.append({name: array.tobytes() for name, array in arrays.items()})
+            found[-1]["record"] = repr(regression.record("x3")).encode()
+        assert found[0] == found[1], k
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("columns", 1e300, "numbers whose squares can be summed"),
+        ("responses", np.nan, "numbers whose squares can be summed"),
+        ("count", 3, "one of so many rows to be remembered"),
+        ("gone_over", -1, "numbers of rows, in order"),
+        ("left_out", -1.0, "expected sums of squares"),
+        ("left0", np.nan, "expected mean squares"),
+        ("begun1", 10_000, "rows that came, and columns that are done"),
+        ("begun_gram1", np.inf, "expected finite numbers"),
+    ],
+)
+def test_what_a_regression_remembers_fits_it(
+    name: str, value: float, said: str, pending: Path, tmp_path: Path
+) -> None:
+    body, stored = read_model(pending)
+    arrays = {key: np.array(array) for key, array in dict(stored or {}).items()}
+    arrays[f"regression0.{name}"].flat[0] = value
+    write_model(tmp_path / "model", body, arrays)
+    with pytest.raises(ModelFileError, match=said):
+        WorldModel.load(tmp_path / "model")
+    del arrays[f"regression0.{name}"]
+    write_model(tmp_path / "model", body, arrays)
+    if name != "left0":  # which earlier files don't say
+        with pytest.raises(ModelFileError, match="missing"):
+            WorldModel.load(tmp_path / "model")
 
 
 @pytest.mark.parametrize(
