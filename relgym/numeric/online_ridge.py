@@ -234,12 +234,8 @@ class _Solution:
     def __init__(
         self, rows: int, gram: NDArray[np.float64], moments: NDArray[np.float64], squares: NDArray[np.float64]
     ) -> None:
-        self.rows, self._gram, self._moments, self._squares = (
-            rows,
-            gram.copy(),
-            moments.copy(),
-            squares.copy(),
-        )
+        self.rows, self._gram = rows, gram.copy()
+        self._moments, self._squares = moments.copy(), squares.copy()
         self._mean = gram[0, 1:] / rows
         covariance = gram[1:, 1:] / rows - self._mean[:, None] * self._mean
         variance = covariance.diagonal()

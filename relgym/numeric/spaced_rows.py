@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import FIRST_ROOM
 from relgym.errors import ConfigError
+from relgym.numeric.growing import grown, thin
 
 __all__ = ["SpacedRows"]
 
@@ -26,7 +26,7 @@ class SpacedRows:
 
     Notes
     -----
-    Cost O(width) a row. There is no chance in it: a stream leaves the same rows whenever it comes.
+    Cost amortised O(width) a row. There is no chance in it: a stream leaves the same rows whenever it comes.
 
     Examples
     --------
@@ -64,10 +64,10 @@ class SpacedRows:
         number, self.seen = self.seen, self.seen + 1
         if number % self.every:
             return
+        if not self._size:
+            self._columns = np.zeros((len(self._columns), len(columns)))
         if self._size == len(self._columns):
-            more = (0, max(FIRST_ROOM, self._size))
-            self._responses = np.pad(self._responses, (more, (0, 0)))
-            self._columns = np.pad(self._columns, (more, (0, len(columns) - self._columns.shape[1])))
+            self._columns, self._responses = grown(self._columns), grown(self._responses)
         self._columns[self._size], self._responses[self._size, : len(responses)] = columns, responses
         self._size += 1
 
@@ -88,10 +88,10 @@ class SpacedRows:
         if most < 1:
             raise ConfigError(f"expected at least one row to be kept, got {most}")
         while self._size > most:
-            kept, self.every = (self._size + 1) // 2, 2 * self.every
+            kept = np.arange(self._size) % 2 == 0
             for rows in (self._columns, self._responses):
-                rows[:kept] = rows[: self._size : 2].copy()
-            self._size = kept
+                thin(rows, kept)
+            self._size, self.every = int(kept.sum()), 2 * self.every
 
     # ------------------------------------------------------------------ saving
     def to_arrays(self) -> dict[str, NDArray[Any]]:

@@ -219,9 +219,8 @@ class Regression:
         least, most = self._bounds()[:, : y.shape[1]]
         far = leverage * self._growth()[0]
         self._left_out[:, : y.shape[1]] += _squares(y, 0.0, np.clip(word, least, most), far) * len(y)
-        if end == self._rows_before and end >= min(
-            FIRST, first.rows
-        ):  # of a file of before few rows are remembered
+        # What comes from an earlier file remembers few rows at first, which tell less than the say that it has.
+        if end == self._rows_before and end >= min(FIRST, first.rows):
             # Each row is tried twice: before it was learned, and left out of all.
             self._say[0] = _says(self._left[0] + self._left_out / end, end)
             trials = first.rows - FIRST
