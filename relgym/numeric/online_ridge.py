@@ -1,7 +1,7 @@
 """Ridge regression kept up to date one row at a time: sums of products, solved anew as rows become more.
 
 That costs the cube of the number of columns, 25 ms for 300 of them, so it is done in pieces, with the rows that come:
-meanwhile the weights are those of the solution before.
+meanwhile the weights are those of the solution before, and none before the first one.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ class OnlineRidge:
     columns
         Number of columns, d.
     due
-        Number of rows at which weights are solved for the first time.
+        Number of rows from which weights are solved for the first time.
 
     Attributes
     ----------
     rows
         Number of rows taken in.
+    solved
+        Whether there are weights: until then they are 0.
     weights
         One row for each response, the intercept first, shape ``(responses, d + 1)``; of a response that came later
         than some rows, as if it had been 0 in those.
@@ -48,7 +50,7 @@ class OnlineRidge:
     Notes
     -----
     Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every eighth more, in pieces of `SEARCHED_CELLS`
-    cells a row, but the first time at once.
+    cells a row.
 
     References
     ----------
@@ -74,7 +76,8 @@ class OnlineRidge:
         self._squares = np.zeros(0)
         self.left = np.zeros(0)
         self._due = due
-        self._solved = 0  # rows that the weights come from, if they were solved here
+        self.solved = False
+        self._solved_of = 0  # rows that the weights come from, if they were solved here
         self._begun: _Solution | None = None
         self.worked = 0
 
@@ -100,8 +103,7 @@ class OnlineRidge:
         if self._begun is None and self.rows >= self._due:
             self._begin()
         if self._begun is not None:
-            known = np.isfinite(self.spread).all()
-            self.worked = self._begun.advance(SEARCHED_CELLS if known else sys.maxsize)
+            self.worked = self._begun.advance(SEARCHED_CELLS)
             self._finish()
 
     def _widen(self, responses: int) -> None:
@@ -114,7 +116,7 @@ class OnlineRidge:
 
     def solve(self) -> None:
         """Work out the weights from the rows so far, unless that was done."""
-        if self._solved == self.rows:
+        if self._solved_of == self.rows:
             return
         if self._begun is None or self._begun.rows != self.rows:
             self._begin()
@@ -131,8 +133,9 @@ class OnlineRidge:
         if self._begun is None or not self._begun.done:
             return
         done, self._begun = self._begun, None
-        self._solved = done.rows
+        self._solved_of = done.rows
         if (found := done.weights()) is not None:
+            self.solved = True
             self.mean, self.spread, weights, left = found
             later = len(self._moments) - len(weights)  # responses that came meanwhile
             self.weights = np.pad(weights, ((0, later), (0, 0)))
@@ -195,9 +198,10 @@ class OnlineRidge:
 
     @classmethod
     def restored(cls, rows: int, due: int, arrays: Mapping[str, NDArray[Any]]) -> OnlineRidge:
-        """What `to_arrays` wrote; sums may be missing, then it can only predict."""
+        """What `to_arrays` wrote, of one that was solved; sums may be missing, then it can only predict."""
         weights = arrays["weights"]
         found = cls(weights.shape[1] - 1)
+        found.solved = True
         found.rows, found._due, found.weights = rows, due, weights.copy()
         found._moments, found._squares = np.zeros_like(weights), np.zeros(len(weights))
         found.left = arrays.get("left", np.full(len(weights), np.inf)).copy()

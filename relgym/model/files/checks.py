@@ -163,6 +163,8 @@ def _check_calibration(body: Body, known: set[str], experts: int) -> None:
             _distinct([who for who, *_ in cell.records], "calibration")
             whole = len(cell.squares) == experts > max([cell.speaker, *(who for who, *_ in cell.records)])
             _require(whole, "calibration", f"expected {experts} experts: five, and config.hypotheses")
+        speakers = [who for _, who, *_ in calibration.waiting]
+        _require(max(speakers, default=0) < experts, "calibration", f"expected {experts} experts")
         _require(
             all(hits <= trials for _, trials, hits, *_ in records), "calibration", "more hits than trials"
         )

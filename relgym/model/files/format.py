@@ -444,6 +444,9 @@ Expert: TypeAlias = Annotated[
 Squares: TypeAlias = Annotated[
     float, Meta(ge=0.0, le=1e304, description="a sum of squares of errors, each of 1e150 at most")
 ]
+Off: TypeAlias = Annotated[
+    float, Meta(ge=0.0, le=1e150, description="how far two values of a property lie apart")
+]
 Bin: TypeAlias = Annotated[int, Meta(ge=-(2**14), le=2**11, description="quarter octaves of a size")]
 Bins: TypeAlias = list[tuple[Bin, Weight]]
 Kind: TypeAlias = tuple[
@@ -471,7 +474,8 @@ class CellRecord(Record):
     those of misses and of hits, and how many there were, maybe then the mean lengths of those of hits in the two
     records before this one that misses ended, and how often the mode was revised; squares are trials, the expert's own
     and those of saying that nothing changes. Steady are predictions in a row, up to now, that came out as such ones do,
-    passed those of them for which the next one that is learned from stands; doubt are bits by which intervals held less
+    passed those of them that came true, and thinned those that were only roughly right, for which the next one that is
+    learned from stands; doubt are bits by which intervals held less
     often than they are to; since are hits in a row after one was claimed though what it read was predicted wrongly.
     """
 
@@ -484,10 +488,14 @@ class CellRecord(Record):
     squares: Annotated[list[tuple[Weight, Squares, Squares]], Meta(min_length=5)]
     doubt: Weight = 0.0
     since: Count | None = None
+    thinned: Count = 0
 
 
 class CalibrationRecord(Record):
-    """How right a target's predictions were, and what it changes by, in bins."""
+    """How right a target's predictions were, and what it changes by, in bins.
+
+    Waiting to be counted are predictions that were left out: of what kind, who spoke, what he was off by, what changed.
+    """
 
     trials: Count
     slips: tuple[Weight, Weight]
@@ -495,6 +503,7 @@ class CalibrationRecord(Record):
     changes: Bins
     cells: list[CellRecord]
     proven: Count = 0
+    waiting: list[tuple[Kind, Expert, Off, Off]] = []
 
 
 class LeverageRecord(Record):

@@ -105,12 +105,13 @@ def learn(
         _go_on(parts, budget)
     searches = _for_searches(budget)
     rows = {name: table.seen for name, table in parts.tables.items()}
+    learned = False
     for type_name in parts.by_type:
         if parts.laws is not None and parts.laws.suffice(type_name, parts.targets):
             continue
         for index in before.layout.of_type(type_name):
             if (only is None or index in only) and stays[index]:
-                _learn_object(parts, percept, index, following, reports, searches, confirmed)
+                learned |= _learn_object(parts, percept, index, following, reports, searches, confirmed)
     for target in found:  # behind the change: of what is always the same hardly a function is verified
         table = parts.tables[target.type]
         recall(parts, target, len(table) - table.seen + rows.get(target.type, 0), searches)
@@ -125,11 +126,11 @@ def learn(
         and parts.laws.learn_one(percept, following, _there(parts, transition, only), parts.models, told)
     )
     work = 0
-    if not idle or reports or heard:
+    if not idle or learned or heard:
         work = _refresh(parts, budget)
         parts.agenda.close(budget, [t for t in parts.targets if parts.models[t].clusterer.searching])
         parts.idle = not budget.spent and _nothing_waits(parts)
-    counted = not (reports or heard or budget.spent or found)
+    counted = not (learned or heard or budget.spent or found)
     return LearnReport(reports, work, counted=counted)
 
 
@@ -220,8 +221,8 @@ def _learn_object(
     reports: dict[tuple[str, str], ClusterReport],
     budget: Budget,
     confirmed: Mapping[tuple[str, str], Confirmed],
-) -> None:
-    """Learn from one object."""
+) -> bool:
+    """Learn from one object; whether anybody did."""
     layout = percept.layout
     name = layout.names[index]
     type_name = layout.types[index].name
@@ -233,20 +234,22 @@ def _learn_object(
             continue
         if not model.take_for_known(one.mode):
             weights[target.property] = 1
-    if not weights:
-        return
+    # Not `asks_regressions`: what is learned doesn't depend on whether somebody looks back. What is left out here it
+    # learns from all the same: it takes little, and to sums every row counts.
+    rough = any([model.rough for _, model in parts.by_type[type_name]])
+    if not (weights or rough):
+        return False
     situation = percept.situation(index)
-    table = parts.tables[type_name]
     x = percept.rows(index, following[None])[0]
-    bodies = bodies_of(situation.order[0], layout)
-    row = table.add(situation.signature, x, situation.keys[0], bodies)
-    example = situation.examples.at(0, situation.keys[0])
     changes: dict[str, float] = {}
-    rough = False  # not `asks_regressions`: what is learned doesn't depend on whether somebody looks back
+    if weights:
+        bodies = bodies_of(situation.order[0], layout)
+        table = parts.tables[type_name]
+        row = table.add(situation.signature, x, situation.keys[0], bodies)
+        example = situation.examples.at(0, situation.keys[0])
     for target, model in parts.by_type[type_name]:
         column = layout.column(index, target.property)
         y = float(following[column])
-        rough = rough or model.rough
         changes[target.property] = y - (0.0 if type_name == TASK else percept.vectors[0, column])
         if target.property in weights:
             report = model.learn_one(
@@ -258,6 +261,7 @@ def _learn_object(
         if regression.learn_one(situation.signature, x, changes):
             _tell_regressed(parts, type_name)
         budget.spend(regression.worked)
+    return True
 
 
 def _tell_regressed(parts: Parts, type_name: str) -> None:

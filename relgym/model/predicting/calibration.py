@@ -57,7 +57,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.config import ModelConfig
-from relgym.config.constants import COVERED, EVIDENCE, FEW, MAJORITY, MEMORY, NEARLY_ALL, OCTAVE, SUMMABLE
+from relgym.config.constants import (
+    COVERED,
+    EVIDENCE,
+    FEW,
+    FIRST,
+    MAJORITY,
+    MEMORY,
+    NEARLY_ALL,
+    OCTAVE,
+    SUMMABLE,
+)
 from relgym.program.records import EXPERTS, NO_RUNNER_UP, OF_ALL, OF_FAMILY, OF_REGRESSION, OF_WINNER
 
 __all__ = [
@@ -71,6 +81,7 @@ __all__ = [
     "key_of",
     "keys_of",
     "lead_bins",
+    "missed",
 ]
 
 OWN, GUESS, REGRESSION, LATEST, PERSISTENCE = range(len(EXPERTS))
@@ -114,6 +125,23 @@ class Audit(msgspec.Struct, frozen=True, gc=False):
     values: tuple[float, ...]
     speaker: int = 0
 
+    @property
+    def present(self) -> float:
+        """What it would be if nothing changed."""
+        return self.values[PERSISTENCE]
+
+
+class _Waiting(NamedTuple):
+    """How a prediction came out that was left out: its cell, who spoke, what he was off by, and what changed.
+
+    Both are 0 up to rounding.
+    """
+
+    key: Key
+    speaker: int
+    off: float
+    change: float
+
 
 class Assessment(NamedTuple):
     """What is made of a prediction.
@@ -146,6 +174,12 @@ def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
     if math.isinf(margin):
         return Key(outcome, winner, NO_RUNNER_UP)
     return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), NO_RUNNER_UP - 1))
+
+
+def missed(value: float, came: float, rounding: float, turn: float = 0.0) -> float:
+    """How far a value was off; 0 up to rounding. Of an angle, whose full turn is so long, the shorter way round."""
+    off = abs(math.remainder(value - came, turn) if turn and value == value else value - came)
+    return 0.0 if off <= rounding else min(off, SUMMABLE)
 
 
 def far_bin(distance: float) -> int:
@@ -314,7 +348,10 @@ class _Cell:
     heard: float = 0.0  # predictions, those of long ago counting less
     # Predictions in a row, up to now, that came out as such ones do; of rough ones in the cell of their winner.
     steady: int = 0
-    passed: int = 0  # predictions left out lately: the next one that is learned from stands for these, too
+    # Predictions left out lately: that came true, and that were only roughly right. The next one of these that is
+    # learned from stands for them, too.
+    passed: int = 0
+    thinned: int = 0
     doubt: float = 0.0  # bits by which a winner's intervals held less often lately than they are to
     # Hits in a row since the winner was claimed though what it read was predicted wrongly; None: that is over.
     since: int | None = None
@@ -372,6 +409,12 @@ class _Cell:
             if self.speaker in _VALUES:
                 self.records[self.speaker].errors = {}
             self.speaker = best
+
+    def heed(self, speaker: int, error: float, within: float) -> None:
+        """Take in how a prediction came out of which only is known what the speaker was off by, as `count` would."""
+        if speaker in (OWN, self.speaker, *_VALUES):
+            self._sure = None
+            self._hear(speaker, error, within, 1, speaks=True)
 
     def _restart(self, expert: int) -> None:
         """An expert is another one now; the rest are compared with it by what comes from now on, nearly."""
@@ -504,6 +547,8 @@ class Calibration:
         self.trials = 0
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
+        # Predictions that were left out, until the next one is learned from.
+        self._waiting: list[_Waiting] = []
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
         self._claimed: dict[tuple[Key, Assessment], bool] = {}
         self._least: dict[int, float] = {}  # probability that claims need, by who makes them
@@ -876,8 +921,9 @@ class Calibration:
             Whether what it read was predicted wrongly: that says nothing of what it makes of it. Who was claimed all
             the same is claimed again once he was right a few times.
         """
-        errors = [math.remainder(v - came, turn) if turn and v == v else v - came for v in audit.values]
-        errors = [0.0 if abs(e) <= rounding else min(abs(e), SUMMABLE) for e in errors]
+        if self._waiting:
+            self._catch_up(error)
+        errors = [missed(value, came, rounding, turn) for value in audit.values]
         self.trials += not times
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
@@ -951,41 +997,69 @@ class Calibration:
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(self, key: Key, draw: float, *, held: bool) -> int:
+    def thin(
+        self,
+        key: Key,
+        speaker: int,
+        off: float,
+        change: float,
+        draw: float,
+        *,
+        held: bool,
+        misled: bool = False,
+    ) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
-        The more of a winner there are, the less one more tells: `MEMORY` of them tell what it leaves to 2 %.
-        So of n, one of n / `MEMORY` is learned from: of each twice as many, as many again. Kinds of few trials are
-        learned from in any case. Where intervals hold less often than they are to, by `EVIDENCE` bits, the world isn't
-        what it was, and all is learned from (cumulative sums: Page 1954; the alternative is that four to five times as
-        many lie outside).
+        The more of a winner there are, the less one more tells: `FIRST` of them tell what it leaves to 9 %.
+        So of n, one of n / `FIRST` is learned from, of each twice as many as many again, until one of `FEW` is: then
+        learning takes little beside predicting. Kinds of few trials are learned from in any case. Where intervals hold
+        less often than they are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from
+        (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside). How often who
+        speaks is right, and how far off, is counted of all of its kind and winner.
 
         Parameters
         ----------
-        key
-            Its kind.
+        key, speaker
+            Its kind, and who spoke.
+        off, change
+            What the value was off by, and what changed (`missed`).
         draw
             As of `confirm`.
         held
             Whether what came lay in its interval.
+        misled
+            As of `look_back`.
         """
         kind = self._cells.get(key)
         cell = self._cells.get(_winner(key)) if key.winner else kind
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        missed = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
-        likelihood = (1.0 - missed) / COVERED if held else missed / (1.0 - COVERED)
+        beyond = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
+        likelihood = (1.0 - beyond) / COVERED if held else beyond / (1.0 - COVERED)
         cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
-        if cell.doubt == 2.0 * EVIDENCE:  # the longer, the more of those before were of another world
-            cell.steady -= cell.steady // FEW
-        left_out = draw * (cell.steady // MEMORY) > 1.0
+        if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
+            cell.steady = 0
+        left_out = draw * min(cell.steady // FIRST, FEW) > 1.0
         if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
-            kind.passed += 1
+            kind.thinned += 1
+            if not misled:
+                self._waiting.append(_Waiting(key, speaker, off, change))
             return 0
-        weight, kind.passed = kind.passed + 1, 0
+        weight, kind.thinned = kind.thinned + 1, 0
         return weight
+
+    def _catch_up(self, error: float) -> None:
+        """Count how predictions came out that were left out; `error` as of `look_back`."""
+        waiting, self._waiting = self._waiting, []
+        for each in waiting:
+            self._changes = _counted(self._changes, _place(each.change))
+        within = error * self.change
+        for key, speaker, off, _ in waiting:
+            for cell in map(self._cells.get, _levels(key)[1:] if key.winner else (key,)):
+                if cell is not None:  # its winner may be gone
+                    cell.heed(speaker, off, within)
 
     def stood_still(self, outcome: int, count: int) -> None:
         """What nobody predicted stayed as it was, so many times: that nothing changes was right."""
@@ -1004,12 +1078,15 @@ class Calibration:
 
         A record that was good enough for all to be claimed goes on: a new one would have to show that first.
         """
+        begun: set[int] = set()
         for key, cell in self._cells.items():
             own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
             if own is not None and own.hits < own.trials and own.even() < 1.0 - self.allowed:
                 cell.records[OWN] = _Record(revised=own.revised + 1)
                 cell._restart(OWN)
                 cell._sure = None
+                begun.add(key.winner)
+        self._waiting = [w for w in self._waiting if w.speaker != OWN or w.key.winner not in begun]
         self._changed()
 
     def _pause(self, key: Key) -> None:
@@ -1087,6 +1164,7 @@ class Calibration:
         for expert in (OWN, LATEST, *range(len(EXPERTS), self.experts)):
             whole.drop(expert)
         self._cells, self._vouched = {_beside(OF_ALL): whole} if self._cells else {}, 0.0
+        self._waiting = []
         self._changed()
 
     def share(self, outcome: int) -> float:
@@ -1115,7 +1193,8 @@ class Calibration:
         for key, cell in Calibration.from_json(less.to_json(), self.probability, *others)._cells.items():
             found._cells.setdefault(key, cell)
         for cell in found._cells.values():  # a number stands for another mode here, maybe
-            cell.steady, cell.passed, cell.doubt = 0, 0, 0.0
+            cell.steady, cell.passed, cell.thinned, cell.doubt = 0, 0, 0, 0.0
+        found._waiting = []
         found.trials = self.trials + other.trials
         return found
 
@@ -1128,6 +1207,7 @@ class Calibration:
             "vouched": self._vouched,
             **({"proven": self._proven} if self._proven else {}),
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
+            **({"waiting": [[list(key), *rest] for key, *rest in self._waiting]} if self._waiting else {}),
             "cells": [
                 {
                     "key": list(key),
@@ -1135,6 +1215,7 @@ class Calibration:
                     "heard": cell.heard,
                     "steady": cell.steady,
                     "passed": cell.passed,
+                    **({"thinned": cell.thinned} if cell.thinned else {}),
                     **({"doubt": cell.doubt} if cell.doubt else {}),
                     **({} if cell.since is None else {"since": cell.since}),
                     "records": [
@@ -1169,6 +1250,10 @@ class Calibration:
         found._vouched = float(data["vouched"])
         found._proven = int(data.get("proven", 0))
         found._changes = {int(place): float(count) for place, count in data["changes"]}
+        found._waiting = [
+            _Waiting(Key(*map(int, key)), int(who), float(off), float(change))
+            for key, who, off, change in data.get("waiting", ())
+        ]
         for each in data["cells"]:
             records = {
                 int(who): _Record(
@@ -1189,6 +1274,7 @@ class Calibration:
                 float(each["heard"]),
                 int(each["steady"]),
                 int(each["passed"]),
+                int(each.get("thinned", 0)),
                 float(each.get("doubt", 0.0)),
                 None if (since := each.get("since")) is None else int(since),
             )

@@ -59,14 +59,16 @@ class LateAudit:
         Works it out.
     key, speaker
         What kind of prediction it is of, and who spoke.
+    present
+        What it would be if nothing changed.
     """
 
-    __slots__ = ("_found", "_work", "key", "speaker")
+    __slots__ = ("_found", "_work", "key", "present", "speaker")
 
-    def __init__(self, work: Callable[[], Audit | None], key: Key, speaker: int) -> None:
+    def __init__(self, work: Callable[[], Audit | None], key: Key, speaker: int, present: float) -> None:
         self._work: Callable[[], Audit | None] | None = work
         self._found: Audit | None = None
-        self.key, self.speaker = key, speaker
+        self.key, self.speaker, self.present = key, speaker, present
 
     def __call__(self) -> Audit | None:
         """The audit; worked out once."""
@@ -74,12 +76,12 @@ class LateAudit:
             self._found, self._work = self._work(), None
         return self._found
 
-    def __reduce__(self) -> tuple[Callable[..., LateAudit], tuple[Audit | None, Key, int]]:
-        return _audited, (self(), self.key, self.speaker)
+    def __reduce__(self) -> tuple[Callable[..., LateAudit], tuple[Audit | None, Key, int, float]]:
+        return _audited, (self(), self.key, self.speaker, self.present)
 
 
-def _audited(audit: Audit | None, key: Key, speaker: int) -> LateAudit:
-    return LateAudit(lambda: audit, key, speaker)
+def _audited(audit: Audit | None, key: Key, speaker: int, present: float) -> LateAudit:
+    return LateAudit(lambda: audit, key, speaker, present)
 
 
 # One is made for every target in every step, and thousands are kept for a while: Python's collector of cycles took

@@ -166,7 +166,8 @@ def settled(
         told, value, present = word, one.value, following.copy()
         claimed = model.claims(key, told)
         others = partial(_overruled, parts, target, percept, index, present, value, lawful=lawful, key=key)
-        record = LateAudit(others, key, OWN)
+        now = float(present[percept.layout.column(index, target.property)])
+        record = LateAudit(others, key, OWN, now)
     else:
         if values is None:
             values = _experts_one(parts, target, percept, index, following, one.value, lawful=lawful)

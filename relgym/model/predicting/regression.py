@@ -24,6 +24,8 @@ import math
 from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from functools import cache
+from itertools import takewhile
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,7 +147,12 @@ class Regression:
         if len(self._waiting) == FIRST:
             self._begin()
             self._begin_leaving_out()
-        return bool(self._ridges)
+        return bool(self._ready)
+
+    @property
+    def _ready(self) -> list[OnlineRidge]:
+        """Regressions that have been solved; one with products tells what it adds to the linear one."""
+        return list(takewhile(attrgetter("solved"), self._ridges))
 
     def record(self, target: str) -> tuple[float, float, float] | None:
         """Rows learned, squares of a target's changes that would be left of as many others, and those of the changes.
@@ -155,7 +162,7 @@ class Regression:
         if not self._ridges or target not in self.targets:
             return None
         k, first = self.targets.index(target), self._ridges[0]
-        left = min(float(ridge.left[k]) for ridge in self._ridges)
+        left = min(float(ridge.left[k]) for ridge in self._ridges)  # infinite before it is solved
         if not math.isfinite(left):
             return None
         return float(first.rows), first.rows * left, first.rows * float(first.size[k])
@@ -195,7 +202,7 @@ class Regression:
         with np.errstate(over="ignore"):
             far = leverage * self._growth()
         whole = np.zeros_like(y)
-        for kind, (word, q) in enumerate(zip(found[0, : len(self._ridges)], far[0], strict=False)):
+        for kind, (word, q) in enumerate(zip(found[0, : len(self._ready)], far[0], strict=False)):
             known, left = np.isfinite(word), self._left[kind]
             more = np.where(known, word - whole, 0.0)
             squares = _squares(y[None], whole, more[None], np.array([q]))
@@ -211,6 +218,8 @@ class Regression:
     def _leave_out(self, steps: int) -> None:
         """Leave out some rows, so many that all are gone over in as many steps; then the rates have a new say."""
         begin, first = self._gone_over, self._ridges[0]
+        if not first.solved:
+            return
         self._gone_over = end = begin - (begin - self._rows_before) // steps
         if begin == end:
             return
@@ -224,7 +233,7 @@ class Regression:
             # Each row is tried twice: before it was learned, and left out of all.
             self._say[0] = _says(self._left[0] + self._left_out / end, end)
             trials = first.rows - FIRST
-            for kind in range(1, len(self._ridges) if trials > 0 else 1):
+            for kind in range(1, len(self._ready) if trials > 0 else 1):
                 self._say[kind] = _says(self._left[kind], trials)
 
     def _add(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> bool:
@@ -254,13 +263,13 @@ class Regression:
 
     def values(self, signature: SlotSignature, x: NDArray[np.float64]) -> Regressed | None:
         """What they say of rows ``(n, width)``; None while there is nothing."""
-        if not self._ridges or (places := self._columns(signature)) is None:
+        if not (ready := self._ready) or (places := self._columns(signature)) is None:
             return None
         words, leverage = self._said(x[:, places])
-        found, first = np.zeros_like(words[:, 0]), self._ridges[0]
+        found, first = np.zeros_like(words[:, 0]), ready[0]
         with np.errstate(over="ignore"):  # what lies that far is far from all
             far = leverage * self._growth()
-            for kind in range(len(self._ridges)):
+            for kind in range(len(ready)):
                 word, share = words[:, kind], _counted(self._say[kind][:, None], far[:, kind, None])
                 found = np.where(np.isfinite(word), found + share * (word - found), found)
             distances = leverage[:, 0] / min(1.0, first.columns * (1.0 / max(first.rows, 1)))
@@ -272,7 +281,7 @@ class Regression:
         leverage = np.zeros((len(x), len(KINDS)))
         with np.errstate(over="ignore", invalid="ignore"):  # of a gross error nothing is told
             shown = self._shown(self._scaled(x))
-            for k, (ridge, columns) in enumerate(zip(self._ridges, shown, strict=False)):
+            for k, (ridge, columns) in enumerate(zip(self._ready, shown, strict=False)):
                 found[:, k, : len(ridge.weights)] = ridge.predict(columns)
                 leverage[:, k] = ridge.leverage(columns)
         return np.clip(found, *self._bounds()), leverage
@@ -280,7 +289,7 @@ class Regression:
     def _growth(self) -> NDArray[np.float64]:
         """The squared distance at a leverage of 1, for each regression, shape ``(kinds,)``."""
         found = np.ones(len(KINDS))
-        for k, ridge in enumerate(self._ridges):
+        for k, ridge in enumerate(self._ready):
             found[k] = max(1.0, ridge.rows / ridge.columns)
         return found
 
@@ -291,19 +300,19 @@ class Regression:
 
         And what the leverage in each regression is worked out from: mean and packed spread.
         """
-        if not self._ridges or (places := self._columns(signature)) is None:
+        if not (ready := self._ready) or (places := self._columns(signature)) is None:
             return None
-        reach = [(tuple(r.mean.tolist()), self._text(k)) for k, r in enumerate(self._ridges)]
+        reach = [(tuple(r.mean.tolist()), self._text(k)) for k, r in enumerate(ready)]
         return places.tolist(), self._centre.tolist(), self._scale.tolist(), reach
 
     def sums(self, target: str) -> tuple[tuple[tuple[float, ...], ...], tuple[float, float]] | None:
         """Weights of each regression for a target, and bounds of the change; None where nothing is known of it."""
-        if not self._ridges or target not in self.targets:
+        if not (ready := self._ready) or target not in self.targets:
             return None
         k = self.targets.index(target)
         least, most = self._bounds()[:, k].tolist()
         weights = (  # a file may know those of some targets alone
-            r.weights[k].tolist() if k < len(r.weights) else [np.nan] * (r.columns + 1) for r in self._ridges
+            r.weights[k].tolist() if k < len(r.weights) else [np.nan] * (r.columns + 1) for r in ready
         )
         return tuple(map(tuple, weights)), (least, most)
 
@@ -313,8 +322,9 @@ class Regression:
 
         The squared distance at h = 1, 1 / rows, and how far each rate has a say (`relgym.program.records.Trusted`).
         """
-        found, growth = np.empty((len(self.targets), len(self._ridges), 2 + len(RATES))), self._growth()
-        for kind, ridge in enumerate(self._ridges):
+        ready, growth = self._ready, self._growth()
+        found = np.empty((len(self.targets), len(ready), 2 + len(RATES)))
+        for kind, ridge in enumerate(ready):
             found[:, kind, 0], found[:, kind, 1] = growth[kind], 1.0 / max(ridge.rows, 1)
             found[:, kind, 2:] = self._say[kind].T
         return found
@@ -418,6 +428,7 @@ class Regression:
         for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
             ridge.mean = np.array(known["mean"], dtype=np.float64)
             ridge.spread = _unpacked(known["inverse"], ridge.columns)
+            ridge.solved = not np.isinf(ridge.spread).any()
 
 
 def _counted(say: NDArray[np.float64], far: NDArray[np.float64] | float) -> NDArray[np.float64]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,17 +105,18 @@ def distant_forces(parts: Parts, unexplained: Sequence[Target]) -> dict[str, tup
     for name, sources in book.sources.items():
         logs = [models[name, v].clusterer for v in sources.velocity if (name, v) in models]
         wanted = any(t.type == name and t.property in sources.velocity for t in unexplained)
-        # What came before a target was found isn't among its examples.
-        first = [len(log.rows) - min(len(other.rows) for other in logs) for log in logs]
-        shared = [log.rows[k:] for log, k in zip(logs, first, strict=True)]
-        if not wanted or not logs or not len(shared[0]) or (np.stack(shared) != shared[0]).any():
+        if not wanted or not logs:
+            continue
+        # What came before a target was found isn't among its examples, nor what it was left out of.
+        shared = reduce(np.intersect1d, [log.rows for log in logs])
+        if not len(shared):
             continue
         examples = _Examples(
             parts.tables[name],
             sources,
             Axes.of(parts.schema),
-            shared[0],
-            np.stack([log.y[k:] for log, k in zip(logs, first, strict=True)], axis=1),
+            shared,
+            np.stack([log.y[np.isin(log.rows, shared)] for log in logs], axis=1),
             parts.perception.extractor.names,
             parts.schema.layout(),
             max(book.tolerance, LEAST),

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.predicting.calibration import OWN, Calibration, Key
-from relgym.model.predicting.prediction import Outcome, Prediction, ScenePrediction
+from relgym.model.predicting.calibration import OWN, Audit, Calibration, missed
+from relgym.model.predicting.prediction import LateAudit, Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
     from relgym.model.parts import Answer, Parts
@@ -47,7 +47,7 @@ class Standing(Enum):
     Attributes
     ----------
     SETTLED
-        Nothing: modes are laws, and nothing is being looked for.
+        Nothing: modes are laws, and nothing is being looked for. Little if they read what is known only roughly.
     COARSE
         Little: it is known only roughly what comes, and nothing tells more.
     OPEN
@@ -222,9 +222,11 @@ class _Look:
         lawful = self._laws is not None and self._laws.governs(target)
         if not lawful:
             standing = model.standing
-            if standing is Standing.COARSE:
-                return self._passed(part, residual, answer, record.key)
-            if standing is not Standing.SETTLED or self._misled(answer):
+            if standing is Standing.OPEN:
+                return False
+            if standing is Standing.COARSE or part.outcome is Outcome.DEPENDS:
+                return self._passed(part, residual, answer)
+            if self._misled(answer):
                 return False
         if part.outcome is not Outcome.PREDICTED or not part.mode or record.speaker != OWN:
             return False
@@ -242,25 +244,35 @@ class _Look:
         self.counts.setdefault(target, [0, 0])[0] += 1
         return True
 
-    def _passed(self, part: Prediction, residual: float, answer: Answer, key: Key) -> bool:
+    def _passed(self, part: Prediction, residual: float, answer: Answer) -> bool:
         """`repeats` of what is only roughly right.
 
-        What lies far outside of its interval is news, which is learned from in any case; how right such predictions are
-        is learned from the same share of those as of others.
+        What lies far outside of its interval is news, which modes are taught in any case; how right such predictions
+        are is counted of all.
         """
-        if not self._share:
+        record, model = part.record, answer.model
+        if not self._share or record is None or model.asks_latest:  # which mode held is to be known
             return False
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
             return False
-        held = abs(residual) <= part.interval
-        weight = self._stands = answer.model.calibration.thin(key, self._draw, held=held)
+        came = part.value + residual
+        rounding = max(self._rounding(came), self._least)
+        weight = self._stands = model.calibration.thin(
+            record.key,
+            record.speaker,
+            missed(came - residual, came, rounding, answer.turn),
+            missed(record.present, came, rounding, answer.turn),
+            self._draw,
+            held=abs(residual) <= part.interval,
+            misled=self._deceived(answer, record),
+        )
         if abs(residual) <= STDS * part.interval:
             self.confirmed[part.object, part.property] = Confirmed(NOISE, weight)
         elif not weight:
             self.counted = False
         if not weight:
-            self._note(answer, residual, max(self._rounding(part.value + residual), self._least))
+            self._note(answer, residual, rounding)
         return weight == 0
 
     def _note(self, answer: Answer, residual: float, rounding: float) -> None:
@@ -275,7 +287,6 @@ class _Look:
         came, audit = part.value + residual, part.audit
         rounding = self._rounding(came)
         misled = self._misled(answer)
-        deceived = misled and not self._off.isdisjoint(self._parts.relied_on(model))
         if audit is not None:
             rounding = max(rounding, self._least)
             model.calibration.look_back(
@@ -287,7 +298,7 @@ class _Look:
                 turn=turn,
                 times=self._times,
                 stands=self._stands,
-                misled=deceived and audit.speaker == OWN and audit.key.winner > 0,
+                misled=self._deceived(answer, audit),
             )
         self._note(answer, residual, rounding)
         if not part.mode or self._parts.governs(target) or misled:
@@ -299,6 +310,12 @@ class _Look:
         count = self.counts.setdefault(target, [0, 0])
         count[0] += 1
         count[1] += not abs(residual) <= max(rounding, model.clusterer.scale.tolerance, spread)
+
+    def _deceived(self, answer: Answer, record: Audit | LateAudit) -> bool:
+        """Whether a mode's word rests on another prediction that was off."""
+        if record.speaker != OWN or record.key.winner <= 0 or not self._misled(answer):
+            return False
+        return not self._off.isdisjoint(self._parts.relied_on(answer.model))
 
     def _misled(self, answer: Answer) -> bool:
         """Whether a prediction rests on another one that was off."""

@@ -18,6 +18,7 @@ from relgym.files import reading
 from relgym.files.reading import FileLimits
 from relgym.model.files.storage import read_model, write_model
 from relgym.model.learning.fitting import compare_and_learn
+from relgym.model.target.hindsight import calibration_to_json
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Transition
 
@@ -317,15 +318,22 @@ def pending(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_solution_that_is_pending_goes_on_as_if_never_saved(pending: Path) -> None:
-    model, rest = _noisy(73)
-    again = WorldModel.load(pending)
+@pytest.mark.parametrize("steps", [65, 73])
+def test_a_solution_that_is_pending_goes_on_as_if_never_saved(steps: int, tmp_path: Path) -> None:
+    """The first one, before which only the linear regression has been solved, and a later one."""
+    model, rest = _noisy(steps)
+    assert len(model._parts.regressions["self"]._ready) == (1 if steps == 65 else 2)
+    model.save(tmp_path / "model", history=True)
+    again = WorldModel.load(tmp_path / "model")
     for k, transition in enumerate(rest):
         found = []
         for each in (model, again):
             regression = each._parts.regressions["self"]
             assert k or "begun1" in regression.to_arrays()
-            compare_and_learn(each, transition, each.predict_one(transition.before))
+            told = each.predict_one(transition.before)
+            many = each.predict_batch(transition.before.layout, np.stack([transition.before.vector] * 2))
+            assert many.vectors[1].tobytes() == told.scene.vector.tobytes()
+            compare_and_learn(each, transition, told)
             arrays = regression.to_arrays() | {"reach": regression.reach}
             found.append({name: array.tobytes() for name, array in arrays.items()})
             found[-1]["record"] = repr(regression.record("x3")).encode()
@@ -434,3 +442,43 @@ def test_every_field_may_be_empty_or_is_refused(path: Path, empty: Any) -> None:
             raise AssertionError(f"{'.'.join(where)} = {empty}") from error
         finally:
             inside[key] = kept
+
+
+@pytest.fixture(scope="module")
+def waiting(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of twenty numbers that are noise, with values that nobody claimed and whose predictions were left out."""
+    path = tmp_path_factory.mktemp("waiting") / "model"
+    _noisy(182)[0].save(path, history=True)
+    return path
+
+
+def _waiting(body: dict[str, Any]) -> list[Any]:
+    found: list[Any] = next(known["waiting"] for known in body["calibration"].values() if "waiting" in known)
+    return found
+
+
+def test_what_waits_to_be_counted_goes_on_as_if_never_saved(waiting: Path) -> None:
+    model, rest = _noisy(182)
+    again = WorldModel.load(waiting)
+    for transition in rest:
+        for each in (model, again):
+            compare_and_learn(each, transition, each.predict_one(transition.before))
+        assert calibration_to_json(model._parts) == calibration_to_json(again._parts)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda found: found[0].__setitem__(1, 5), "expected 5 experts"),
+        (lambda found: found[0].__setitem__(2, -1.0), "waiting"),
+        (lambda found: found[0].__setitem__(3, 1e200), "waiting"),
+    ],
+)
+def test_what_waits_to_be_counted_fits(
+    change: Callable[[list[Any]], object], said: str, waiting: Path, tmp_path: Path
+) -> None:
+    body, stored = read_model(waiting)
+    change(_waiting(body))
+    write_model(tmp_path / "model", body, dict(stored or {}))
+    with pytest.raises(ModelFileError, match=said):
+        WorldModel.load(tmp_path / "model")

@@ -201,10 +201,10 @@ def test_many_single_scenes_are_settled_by_the_program(monkeypatch: pytest.Monke
 def test_a_late_audit_is_worked_out_once_and_copied_as_what_it_says() -> None:
     asked = []
     audit = Audit(Key(0, 1, 2), (1.0,), 0)
-    late = LateAudit(lambda: asked.append(1) or audit, audit.key, 0)
+    late = LateAudit(lambda: asked.append(1) or audit, audit.key, 0, 3.0)
     copied = pickle.loads(pickle.dumps(late))
     assert late() == late() == copied() == audit
-    assert (copied.key, copied.speaker) == (audit.key, 0)
+    assert (copied.key, copied.speaker, copied.present) == (audit.key, 0, 3.0)
     assert asked == [1]
 
 
