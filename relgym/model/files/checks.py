@@ -201,6 +201,8 @@ def _check_regressions(body: Body, parts: Parts, pairs: set[tuple[str, str]]) ->
         )
         _require(len(regression.leverage) <= len(regression.ridges), where, "leverage on what there isn't")
         for spread, width in zip(regression.leverage, (d, d + d * (d + 1) // 2), strict=False):
+            if spread is None:
+                continue
             _require(len(spread.mean) == width, where, "expected a mean for each column")
             _decoded(spread.inverse, "float32", (width * (width + 1) // 2,), where)
 

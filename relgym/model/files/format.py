@@ -514,7 +514,10 @@ class LeverageRecord(Record):
 
 
 class RegressionRecord(Record):
-    """Least squares on all numbers of a type: columns, targets, and for each kind rows, when due, and weights."""
+    """Least squares on all numbers of a type: columns, targets, and for each kind rows, when due, and weights.
+
+    No leverage is known, and weights are 0, of what hasn't been solved yet.
+    """
 
     names: list[Name]
     seen: Count
@@ -525,7 +528,7 @@ class RegressionRecord(Record):
     waiting: Annotated[list[tuple[list[float], list[float]]], Meta(max_length=64)]
     ridges: Annotated[list[tuple[Count, Count, list[list[float]]]], Meta(max_length=2)]
     say: tuple[list[Say], list[Say]]
-    leverage: Annotated[list[LeverageRecord], Meta(max_length=2)] = []
+    leverage: Annotated[list[LeverageRecord | None], Meta(max_length=2)] = []
 
 
 class TableRecord(Record):

@@ -378,7 +378,10 @@ class Regression:
             "say": self._say.transpose(0, 2, 1).tolist(),
             "waiting": [[x.tolist(), y.tolist()] for x, y in self._waiting] if history else [],
             "ridges": [[r.rows, r.due, r.weights.tolist()] for r in self._ridges],
-            "leverage": [{"mean": r.mean.tolist(), "inverse": _packed(r.spread)} for r in self._ridges],
+            "leverage": [
+                {"mean": r.mean.tolist(), "inverse": _packed(r.spread)} if r.solved else None
+                for r in self._ridges
+            ],
         }
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
@@ -423,12 +426,15 @@ class Regression:
             self._rows = SpacedRows.restored(arrays)
             self._gone_over, self._rows_before = arrays["gone_over"].tolist()
             self._left_out = arrays["left_out"].copy()
-        for ridge in self._ridges:
-            ridge.spread = np.zeros_like(ridge.spread)
-        for ridge, known in zip(self._ridges, data.get("leverage", ()), strict=False):
-            ridge.mean = np.array(known["mean"], dtype=np.float64)
-            ridge.spread = _unpacked(known["inverse"], ridge.columns)
-            ridge.solved = not np.isinf(ridge.spread).any()
+        leverage = data.get("leverage", ())
+        for k, ridge in enumerate(self._ridges):
+            if k >= len(leverage):  # earlier files don't say it
+                ridge.spread = np.zeros_like(ridge.spread)
+            elif (known := leverage[k]) is None:
+                ridge.solved = False
+            else:
+                ridge.mean = np.array(known["mean"], dtype=np.float64)
+                ridge.spread = _unpacked(known["inverse"], ridge.columns)
 
 
 def _counted(say: NDArray[np.float64], far: NDArray[np.float64] | float) -> NDArray[np.float64]:
