@@ -57,7 +57,7 @@ from relgym.model.files.format import (
     TreeRecord,
 )
 from relgym.model.parts import Parts
-from relgym.model.predicting.calibration import EXPERTS
+from relgym.model.predicting.calibration import EXPERTS, PERSISTENCE
 from relgym.model.predicting.regression import KINDS
 from relgym.model.target.conditions import Conditions
 from relgym.program.records import RATES
@@ -163,8 +163,10 @@ def _check_calibration(body: Body, known: set[str], experts: int) -> None:
             _distinct([who for who, *_ in cell.records], "calibration")
             whole = len(cell.squares) == experts > max([cell.speaker, *(who for who, *_ in cell.records)])
             _require(whole, "calibration", f"expected {experts} experts: five, and config.hypotheses")
-        speakers = [who for _, who, *_ in calibration.waiting]
-        _require(max(speakers, default=0) < experts, "calibration", f"expected {experts} experts")
+        for _, who, _, errors in calibration.waiting:
+            _require(len(errors) == experts > who, "calibration", f"expected {experts} experts")
+            told = None not in (errors[who], errors[PERSISTENCE])
+            _require(told, "calibration", "expected what the speaker and persistence were off by")
         _require(
             all(hits <= trials for _, trials, hits, *_ in records), "calibration", "more hits than trials"
         )

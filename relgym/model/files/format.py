@@ -494,7 +494,8 @@ class CellRecord(Record):
 class CalibrationRecord(Record):
     """How right a target's predictions were, and what it changes by, in bins.
 
-    Waiting to be counted are predictions that were left out: of what kind, who spoke, what he was off by, what changed.
+    Waiting to be counted are predictions that were left out: of what kind, who spoke, whether others had a say, and
+    what each expert was off by.
     """
 
     trials: Count
@@ -503,7 +504,7 @@ class CalibrationRecord(Record):
     changes: Bins
     cells: list[CellRecord]
     proven: Count = 0
-    waiting: list[tuple[Kind, Expert, Off, Off]] = []
+    waiting: list[tuple[Kind, Expert, bool, list[Off | None]]] = []
 
 
 class LeverageRecord(Record):

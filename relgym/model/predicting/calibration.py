@@ -125,22 +125,17 @@ class Audit(msgspec.Struct, frozen=True, gc=False):
     values: tuple[float, ...]
     speaker: int = 0
 
-    @property
-    def present(self) -> float:
-        """What it would be if nothing changed."""
-        return self.values[PERSISTENCE]
-
 
 class _Waiting(NamedTuple):
-    """How a prediction came out that was left out: its cell, who spoke, what he was off by, and what changed.
+    """How a prediction came out that was left out: its cell, who spoke, and what each expert was off by (`missed`).
 
-    Both are 0 up to rounding.
+    NaN of who had no value. Not argued: others had no say in it, and of them, but for persistence, it isn't known.
     """
 
     key: Key
     speaker: int
-    off: float
-    change: float
+    argued: bool
+    errors: tuple[float, ...]
 
 
 class Assessment(NamedTuple):
@@ -389,32 +384,38 @@ class _Cell:
         self._sure = None
         for expert in {OWN, self.speaker, *_VALUES}:
             self._hear(expert, errors[expert], within, times, speaks=expert in (OWN, self.speaker, spoke))
-        base = errors[PERSISTENCE] ** 2
+        base = times * errors[PERSISTENCE] ** 2
         for sums, error in zip(self.squares, errors, strict=True):
             if error == error:
-                if sums[0] >= MEMORY:
-                    sums[:] = [0.5 * s for s in sums]
-                # The latest of n trials counts for two more, and those before for less: (i / n)^2.
-                more = min(2.0, sums[0] / times)
-                kept = max(0.0, 1.0 - more * times / sums[0]) if more else 1.0
-                late = (1.0 + more) * times
-                sums[0] += times
-                sums[1] = kept * sums[1] + late * error * error
-                sums[2] = kept * sums[2] + late * base
+                _weigh(sums, times, times * error * error, base)
         if errors[self.speaker] == 0.0 and self.squares[self.speaker][1] == 0.0:
             return  # nobody is better than who was never off
-        best = self.best([k for k, error in enumerate(errors) if error == error])
+        self._choose([k for k, error in enumerate(errors) if error == error])
+
+    def catch_up(self, waiting: Sequence[_Waiting], within: float) -> None:
+        """Take in how predictions came out that were left out; hits are off by no more than so much."""
+        self._sure = None
+        for _, speaker, _, errors in waiting:
+            if speaker in (OWN, self.speaker, *_VALUES):
+                self._hear(speaker, errors[speaker], within, 1, speaks=True)
+        argued = [each.errors for each in waiting if each.argued]
+        able = []
+        for expert, sums in enumerate(self.squares):
+            some = [(e[expert] ** 2, e[PERSISTENCE] ** 2) for e in argued if e[expert] == e[expert]]
+            if some:
+                _weigh(sums, len(some), *map(sum, zip(*some, strict=True)))
+                able.append(expert)
+        if able:
+            self._choose(able)
+
+    def _choose(self, able: Collection[int]) -> None:
+        """Let who codes best speak, if by enough."""
+        best = self.best(able)
         if best != self.speaker and self.lead(best, self.speaker) >= EVIDENCE:
             self.records = {k: r for k, r in self.records.items() if k in (OWN, *_VALUES)}
             if self.speaker in _VALUES:
                 self.records[self.speaker].errors = {}
             self.speaker = best
-
-    def heed(self, speaker: int, error: float, within: float) -> None:
-        """Take in how a prediction came out of which only is known what the speaker was off by, as `count` would."""
-        if speaker in (OWN, self.speaker, *_VALUES):
-            self._sure = None
-            self._hear(speaker, error, within, 1, speaks=True)
 
     def _restart(self, expert: int) -> None:
         """An expert is another one now; the rest are compared with it by what comes from now on, nearly."""
@@ -1001,11 +1002,11 @@ class Calibration:
         self,
         key: Key,
         speaker: int,
-        off: float,
-        change: float,
+        errors: tuple[float, ...],
         draw: float,
         *,
         held: bool,
+        argued: bool = True,
         misled: bool = False,
     ) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
@@ -1015,18 +1016,18 @@ class Calibration:
         learning takes little beside predicting. Kinds of few trials are learned from in any case. Where intervals hold
         less often than they are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from
         (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside). How often who
-        speaks is right, and how far off, is counted of all of its kind and winner.
+        speaks is right, and how far off everybody is, is counted of all, in the cells of their kind and winner.
 
         Parameters
         ----------
-        key, speaker
-            Its kind, and who spoke.
-        off, change
-            What the value was off by, and what changed (`missed`).
+        key, speaker, errors
+            Its kind, who spoke, and what each expert was off by (`missed`), NaN of who had no value.
         draw
             As of `confirm`.
         held
             Whether what came lay in its interval.
+        argued
+            Whether others had a say; if not, only what the speaker and persistence were off by is known.
         misled
             As of `look_back`.
         """
@@ -1045,7 +1046,7 @@ class Calibration:
             self.trials += 1
             kind.thinned += 1
             if not misled:
-                self._waiting.append(_Waiting(key, speaker, off, change))
+                self._waiting.append(_Waiting(key, speaker, argued, errors))
             return 0
         weight, kind.thinned = kind.thinned + 1, 0
         return weight
@@ -1053,13 +1054,15 @@ class Calibration:
     def _catch_up(self, error: float) -> None:
         """Count how predictions came out that were left out; `error` as of `look_back`."""
         waiting, self._waiting = self._waiting, []
+        of: dict[Key, list[_Waiting]] = {}
         for each in waiting:
-            self._changes = _counted(self._changes, _place(each.change))
+            self._changes = _counted(self._changes, _place(each.errors[PERSISTENCE]))
+            for key in _levels(each.key)[1:] if each.key.winner else (each.key,):
+                of.setdefault(key, []).append(each)
         within = error * self.change
-        for key, speaker, off, _ in waiting:
-            for cell in map(self._cells.get, _levels(key)[1:] if key.winner else (key,)):
-                if cell is not None:  # its winner may be gone
-                    cell.heed(speaker, off, within)
+        for key, some in of.items():
+            if (cell := self._cells.get(key)) is not None:  # its winner may be gone
+                cell.catch_up(some, within)
 
     def stood_still(self, outcome: int, count: int) -> None:
         """What nobody predicted stayed as it was, so many times: that nothing changes was right."""
@@ -1207,7 +1210,7 @@ class Calibration:
             "vouched": self._vouched,
             **({"proven": self._proven} if self._proven else {}),
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
-            **({"waiting": [[list(key), *rest] for key, *rest in self._waiting]} if self._waiting else {}),
+            **({"waiting": [_plain(each) for each in self._waiting]} if self._waiting else {}),
             "cells": [
                 {
                     "key": list(key),
@@ -1251,8 +1254,13 @@ class Calibration:
         found._proven = int(data.get("proven", 0))
         found._changes = {int(place): float(count) for place, count in data["changes"]}
         found._waiting = [
-            _Waiting(Key(*map(int, key)), int(who), float(off), float(change))
-            for key, who, off, change in data.get("waiting", ())
+            _Waiting(
+                Key(*map(int, key)),
+                int(who),
+                bool(argued),
+                tuple(math.nan if e is None else float(e) for e in off),
+            )
+            for key, who, argued, off in data.get("waiting", ())
         ]
         for each in data["cells"]:
             records = {
@@ -1279,6 +1287,24 @@ class Calibration:
                 None if (since := each.get("since")) is None else int(since),
             )
         return found
+
+
+def _weigh(sums: list[float], trials: int, own: float, base: float) -> None:
+    """Add some trials' squares to an expert's: trials, its own squares, and those of persistence."""
+    if sums[0] >= MEMORY:
+        sums[:] = [0.5 * s for s in sums]
+    # The latest of n trials counts for two more, and those before for less: (i / n)^2.
+    more = min(2.0, sums[0] / trials)
+    kept = max(0.0, 1.0 - more * trials / sums[0]) if more else 1.0
+    sums[0] += trials
+    sums[1] = kept * sums[1] + (1.0 + more) * own
+    sums[2] = kept * sums[2] + (1.0 + more) * base
+
+
+def _plain(waiting: _Waiting) -> list[Any]:
+    """One that waits, as plain data."""
+    errors = [None if error != error else error for error in waiting.errors]
+    return [list(waiting.key), waiting.speaker, waiting.argued, errors]
 
 
 def _able(values: Sequence[float]) -> tuple[int, ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from functools import lru_cache
 from itertools import zip_longest
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.predicting.calibration import OWN, Audit, Calibration, missed
+from relgym.model.predicting.calibration import OWN, PERSISTENCE, Audit, Calibration, missed
 from relgym.model.predicting.prediction import LateAudit, Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
@@ -258,13 +258,18 @@ class _Look:
             return False
         came = part.value + residual
         rounding = max(self._rounding(came), self._least)
+        if argued := isinstance(record, Audit):
+            values: Sequence[float] = record.values
+        else:  # to ask the others would take longer than predicting
+            values = [math.nan] * model.calibration.experts
+            values[OWN], values[PERSISTENCE] = part.value, record.present
         weight = self._stands = model.calibration.thin(
             record.key,
             record.speaker,
-            missed(came - residual, came, rounding, answer.turn),
-            missed(record.present, came, rounding, answer.turn),
+            tuple([missed(value, came, rounding, answer.turn) for value in values]),
             self._draw,
             held=abs(residual) <= part.interval,
+            argued=argued,
             misled=self._deceived(answer, record),
         )
         if abs(residual) <= STDS * part.interval:

@@ -470,8 +470,10 @@ def test_what_waits_to_be_counted_goes_on_as_if_never_saved(waiting: Path) -> No
     ("change", "said"),
     [
         (lambda found: found[0].__setitem__(1, 5), "expected 5 experts"),
-        (lambda found: found[0].__setitem__(2, -1.0), "waiting"),
-        (lambda found: found[0].__setitem__(3, 1e200), "waiting"),
+        (lambda found: found[0][3].append(1.0), "expected 5 experts"),
+        (lambda found: found[0][3].__setitem__(4, None), "what the speaker and persistence were off by"),
+        (lambda found: found[0][3].__setitem__(2, -1.0), "waiting"),
+        (lambda found: found[0][3].__setitem__(4, 1e200), "waiting"),
     ],
 )
 def test_what_waits_to_be_counted_fits(

@@ -1499,7 +1499,7 @@ def test_of_two_models_together_all_is_learned_from_at_first() -> None:
 def thinned(known: Calibration, draw: float, *, held: bool = True, key: Key = KEY) -> int:
     """How many a prediction that is only roughly right stands for; learned from if any."""
     audit = Audit(key, values(own=1.3), OWN)
-    if weight := known.thin(key, OWN, 0.3, 1.0, draw, held=held):
+    if weight := known.thin(key, OWN, values(own=0.3, now=1.0), draw, held=held):
         known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
     return weight
 
@@ -1525,8 +1525,8 @@ def left_out(known: Calibration, audit: Audit, came: float, *, misled: bool = Fa
     """A prediction that is left out, since a great many like it came before."""
     for key in {audit.key, audit.key._replace(lead=OF_WINNER)} & known._cells.keys():
         known._cells[key].steady = FEW * FIRST
-    sizes = (missed(value, came, 1e-9) for value in (audit.values[audit.speaker], audit.present))
-    assert known.thin(audit.key, audit.speaker, *sizes, 1.0, held=True, misled=misled) == 0
+    errors = tuple(missed(value, came, 1e-9) for value in audit.values)
+    assert known.thin(audit.key, audit.speaker, errors, 1.0, held=True, misled=misled) == 0
 
 
 @pytest.mark.parametrize(
@@ -1551,7 +1551,23 @@ def test_who_speaks_is_counted_where_predictions_are_left_out_too(audit: Audit) 
     for key in known._cells.keys() - {Key(0, 1, OF_FAMILY)}:
         found = [each._cells[key].records[audit.speaker] for each in (known, whole)]
         assert found[0] == found[1]
-    assert known._cells[audit.key].squares[audit.speaker][0] == 151.0
+    squares = [each._cells[audit.key].squares for each in (known, whole)]
+    assert [trials for trials, *_ in squares[0]] == [trials for trials, *_ in squares[1]]
+    assert np.allclose(squares[0], squares[1], rtol=0.05)  # five at once are weighed as one
+
+
+def test_who_had_no_say_is_heard_of_no_more_than_he_was_asked() -> None:
+    """Of a mode that has the word whatever others say only its own error is known; it isn't held against theirs."""
+    known, audit = right(200), Audit(KEY, values(own=1.0), OWN)
+    before = [list(sums) for sums in known._cells[KEY].squares]
+    known._cells[KEY].steady = known._cells[KEY._replace(lead=OF_WINNER)].steady = FEW * FIRST
+    assert known.thin(KEY, OWN, values(own=0.0, now=1.0), 1.0, held=True, argued=False) == 0
+    known._catch_up(0.05)
+    assert known._cells[KEY].records[OWN].trials == 201.0
+    assert known._cells[KEY].squares == before
+    left_out(known, audit, 1.0)
+    known._catch_up(0.05)
+    assert known._cells[KEY].squares[OWN][0] == before[OWN][0] + 1.0
 
 
 def test_what_was_off_stays_off_whatever_comes_next() -> None:
@@ -1604,8 +1620,8 @@ def test_what_is_left_out_tells_how_right_such_values_are(saved: bool) -> None:
     audit = Audit(Key(2, 0, 0), values(regression=1.0), REGRESSION)
     for k in range(6_000):
         came = 0.99 if k % 3 == 0 else 0.6
-        sizes = missed(1.0, came, 1e-9), missed(0.0, came, 1e-9)
-        weight = known.thin(audit.key, REGRESSION, *sizes, next(drawn), held=True)
+        errors = tuple(missed(value, came, 1e-9) for value in audit.values)
+        weight = known.thin(audit.key, REGRESSION, errors, next(drawn), held=True)
         learned.append(weight > 0)
         if weight:
             known.look_back(audit, came, claimed=False, rounding=1e-9, error=0.05, stands=weight)
@@ -1682,7 +1698,7 @@ def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and
     audit = Audit(KEY, values(own=1.3), OWN)
     for known, stands in ((one, 0), (many, 5)):
         for _ in range(3):
-            known.thin(KEY, OWN, 0.3, 1.0, 0.0, held=True)
+            known.thin(KEY, OWN, values(own=0.3, now=1.0), 0.0, held=True)
         known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
     cells = one._cells[KEY], many._cells[KEY]
     assert cells[0].records == cells[1].records and cells[0].squares == cells[1].squares
