@@ -1085,7 +1085,7 @@ class Calibration:
         for key, cell in self._cells.items():
             own = cell.records.get(OWN) if key.winner in modes and key.lead != OF_FAMILY else None
             if own is not None and own.hits < own.trials and own.even() < 1.0 - self.allowed:
-                cell.records[OWN] = _Record(revised=own.revised + 1)
+                cell.records[OWN] = _Record(run=min(own.run, 0), revised=own.revised + 1)
                 cell._restart(OWN)
                 cell._sure = None
                 begun.add(key.winner)
@@ -1152,14 +1152,18 @@ class Calibration:
         return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
 
     def failing(self, key: Key) -> bool:
-        """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended."""
+        """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended.
+
+        Misses in a row count though what tells when the mode holds was learned again in between.
+        """
         cell = self._cells.get(_winner(key))
         own = None if cell is None else cell.records.get(OWN)
-        if own is None or 2.0 * own.hits >= own.trials:
+        if own is None:
             return False
-        counts = (own.hits, own.trials - own.hits)
-        coded = sum(-n * math.log2(n / own.trials) for n in counts if n)
-        return own.trials - coded >= EVIDENCE
+        counts = (own.hits, max(own.trials - own.hits, -own.run))
+        trials = sum(counts)
+        coded = sum(-n * math.log2(n / trials) for n in counts if n)
+        return counts[1] > counts[0] and trials - coded >= EVIDENCE
 
     def forget(self) -> None:
         """What follows is another model's word: only what mostly changes stays, and what the others know."""

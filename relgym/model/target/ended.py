@@ -6,10 +6,10 @@ It is kept, and votes again as soon as an example comes that it alone explains.
 
 A world that stays as it is has modes that seldom hold, and it goes through its situations in turns. Therefore three
 things must come together. Nothing tells which mode holds (`relgym.model.target.hindsight`). Where the mode wins the
-vote it is wrong, since its record began or began anew (`relgym.model.predicting.calibration.Calibration.failing`). And
-it has not held for so long that this is news: in a share p of the examples up to its last one, and in none of the n
-since, which has the probability (1 - p)^n; but since what comes in a row is alike, each tells one bit at most. What is
-news says `EVIDENCE`.
+vote it is wrong, since its record began or began anew, or ever since it was right, however often clauses were learned
+again in between (`relgym.model.predicting.calibration.Calibration.failing`). And it has not held for so long that this
+is news: in a share p of the examples up to its last one, and in none of the n since, which has the probability
+(1 - p)^n; but since what comes in a row is alike, each tells one bit at most. What is news says `EVIDENCE`.
 """
 
 from __future__ import annotations

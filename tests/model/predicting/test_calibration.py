@@ -1440,6 +1440,19 @@ def test_who_fails_after_each_revision_is_believed_later_each_time() -> None:
     assert again.assess(KEY, values(own=1.0)) == known.assess(KEY, values(own=1.0))
 
 
+def test_misses_in_a_row_show_that_who_wins_fails_though_clauses_were_learned_again_in_between() -> None:
+    known = right(100)
+    for misses in range(1, 15):
+        seen(known, values(own=1.0), 2.0)
+        if misses % 4 == 0:
+            known.revise({1})
+        assert known.failing(KEY) == (misses >= 10)
+    again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
+    assert again.failing(KEY)
+    seen(known, values(own=1.0), 1.0)
+    assert not known.failing(KEY)
+
+
 def test_a_revision_says_nothing_of_what_was_always_right() -> None:
     known = right(20)
     before = known.to_json()
