@@ -88,6 +88,6 @@ def test_a_step_says_what_was_wrong(watched: tuple[ModelLearner, StepReport]) ->
     assert Reader(replace(told, wrong=(("ball", "vx"),))._repr_html_()).of("td").count("wrong") == 1
     assert told.prediction is not None and told.learned is not None
     assert "ball.vy" in Reader(told.prediction._repr_html_()).of("td")
-    assert "units of work" in Reader(told.learned._repr_html_()).of("summary")
+    assert "cells" in Reader(told.learned._repr_html_()).of("summary")
     nothing = StepReport(None, {}, (), None)
     assert Reader(nothing._repr_html_()).of("td") == ""

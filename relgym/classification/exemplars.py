@@ -28,7 +28,7 @@ from relgym.classification.columns import Column, Columns
 from relgym.classification.examples import NOISE, Bools, Example, Floats, Vocabulary, check_example
 from relgym.classification.rows import Gathered, RowPool
 from relgym.config import ClassificationConfig
-from relgym.config.constants import LEAST_EXEMPLARS, MEBIBYTE, WEIGHT_PARTS
+from relgym.config.constants import FIRST, LEAST_EXEMPLARS, MEBIBYTE
 from relgym.mixing import GOLDEN, mixed_one
 
 __all__ = ["COLUMNS", "Exemplars", "dyadic"]
@@ -381,8 +381,8 @@ class Exemplars:
 
 
 def dyadic(weights: Floats) -> Floats:
-    """Weights rounded to multiples of 1 / `WEIGHT_PARTS`, at least one: rounding residues would pass for examples."""
-    return np.maximum(np.round(weights * WEIGHT_PARTS), 1.0) / WEIGHT_PARTS
+    """Weights rounded to multiples of 1 / `FIRST`, a power of two, at least one: residues would pass for examples."""
+    return np.maximum(np.round(weights * FIRST), 1.0) / FIRST
 
 
 def _hash(key: bytes, count: float) -> int:

@@ -249,11 +249,11 @@ class ModeClassifier:
         self._reset_caches()
 
     def refresh(self, budget: float = math.inf, amended: set[int] | None = None) -> int:
-        """Learn stale pairs anew, the most contradicted first, until the budget is spent; the work spent.
+        """Learn stale pairs anew, the most contradicted first, until the budget is spent; the cells spent.
 
-        Work is counted in units of twelve cells, never in time: the result is the same
-        on any machine. A pair is learned in pieces (`Task`), and a piece is finished once begun: one call can
-        overdraw the budget, and a pair may be finished by a later call.
+        Work is counted in cells (`ModelConfig.cells_per_step`), never in time: the result is the same on any machine. A
+        pair is learned in pieces (`Task`), and a piece is finished once begun: one call can overdraw the budget, and a
+        pair may be finished by a later call.
 
         To `amended` are added modes of which it was learned again when they hold.
         """

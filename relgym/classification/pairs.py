@@ -17,7 +17,7 @@ from relgym.classification.learning import Lesson, learn_pair
 from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
-from relgym.config.constants import CALL, NEARLY_ALL, SHORT, UNIT
+from relgym.config.constants import CALL, NEARLY_ALL, SHORT
 from relgym.scheduling.work import Task
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
@@ -98,12 +98,12 @@ class PairState:
         self.stale = self.stale or errors > self.errors or (self.unlearned and min(self.seen) > 0)
 
     def refresh(self, lesson: Lesson, config: ClassificationConfig, budget: float) -> int:
-        """Mend the classifier or learn it anew as far as a budget goes; the work spent. Not `stale`: done."""
+        """Mend the classifier or learn it anew as far as a budget goes; the cells spent. Not `stale`: done."""
         if self.draft is None:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
             mendable = not grown and all(lesson.counts)
             mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
-            work = len(lesson.rows) * (1 + len(self.classifier.definition.clauses)) + CALL // UNIT
+            work = (CALL + len(lesson.rows)) * (1 + len(self.classifier.definition.clauses))
             if mended is not None:
                 self._adopt(mended, lesson, mended=True)
                 return work + mended.work
@@ -112,7 +112,7 @@ class PairState:
             self._taught = lesson.counts
             if mendable:
                 return work
-        work = self.draft.advance(int(min(budget * UNIT, sys.maxsize))) // UNIT + 1
+        work = CALL + self.draft.advance(int(min(budget, sys.maxsize)))
         if self.draft.done:
             found = self.draft.result
             self.learned = self._taught

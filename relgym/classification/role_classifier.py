@@ -17,7 +17,7 @@ from relgym.classification.learning import foil_config
 from relgym.classification.roles import Option, Places, RoleDescription, RoleKind, fillings, stances
 from relgym.classification.views import Scope, View
 from relgym.config import ClassificationConfig
-from relgym.config.constants import ANSWERS, SAME_DIGITS, UNIT
+from relgym.config.constants import ANSWERS, CALL, SAME_DIGITS
 from relgym.logic.clause import Definition
 from relgym.logic.csp import World, matches
 from relgym.logic.facts import Facts
@@ -202,7 +202,7 @@ class RoleClassifier:
                 self._answers.clear()
 
     def refresh(self, exemplars: Exemplars, mode: int, budget: float = math.inf) -> int:
-        """Learn stale descriptions anew from a mode's exemplars as far as a budget goes; the work spent.
+        """Learn stale descriptions anew from a mode's exemplars as far as a budget goes; the cells spent.
 
         They are learned in pieces (`Task`) of the exemplars that there are when that begins. Of those that come in the
         meantime is counted what the new descriptions get wrong. Not `stale`: done.
@@ -216,7 +216,7 @@ class RoleClassifier:
         if self._draft is None:
             self._begin(view, roles, weights)
             assert self._draft is not None, "begun"
-        work = self._draft.advance(int(min(budget * UNIT, sys.maxsize))) // UNIT + 1
+        work = CALL + self._draft.advance(int(min(budget, sys.maxsize)))
         if self._draft.done:
             self._adopt(self._draft.result, view, roles, weights)
         return work

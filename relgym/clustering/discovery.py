@@ -29,7 +29,6 @@ from relgym.config.constants import (
     ACTING,
     ALIKE,
     CALL,
-    DRAW_DIVISORS,
     EXACT,
     EXTRAPOLATED,
     FEW_VALUES,
@@ -43,6 +42,7 @@ from relgym.config.constants import (
     SAMPLES_TRIED,
     SCENE_ROWS,
     SEARCHED_ROWS,
+    SELDOM,
     TOLD,
     VERIFYING,
     WIDE,
@@ -206,7 +206,7 @@ def find_mode(
             size=size,
             draws=max(
                 SAMPLES_TRIED,
-                config.draws // DRAW_DIVISORS[0 if columns == stages[0] else 1 + (columns > WIDE)],
+                config.draws // SELDOM ** (0 if columns == stages[0] else 1 + (columns > WIDE)),
             ),
             rng=rng,
             strata=strata[rows],
@@ -318,7 +318,7 @@ def _in_any_order(
             sigma=scale.sigma,
             loose=loose,
             terms=terms,
-            draws=config.draws // DRAW_DIVISORS[1],
+            draws=config.draws // SELDOM,
             fresh=fresh,
             rng=rng,
         )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.arguments import refusing
-from relgym.config.constants import FREQUENCIES, MOST_FEATURES
+from relgym.config.constants import DEGREES, MOST_FEATURES
 from relgym.errors import ConfigError
 
 __all__ = [
@@ -37,7 +37,7 @@ __all__ = [
     "switched_on",
 ]
 
-_DEGREES = {"squares": 2, "products": 2, "degree3": 3, "degree4": 4}
+_POLYNOMIALS = ("squares", "products", "degree3", "degree4")
 _ENTRY = re.compile(r"(?:(?P<type>[^:]+):)?(?P<kind>\w+)(?:\((?P<names>[\w, ]+)\))?")
 
 Function = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -61,7 +61,7 @@ def register_function(name: str, function: Function) -> None:
     ConfigError
         The name is no identifier or means something already, or the function doesn't map arrays.
     """
-    if not name.isidentifier() or name in {"trig", "sin", "cos", *_DEGREES}:
+    if not name.isidentifier() or name in {"trig", "sin", "cos", *_POLYNOMIALS}:
         raise ConfigError(f"expected a new identifier as a function's name, got {name!r}; choose another one")
     tried = np.array([0.5, 1.0])
     try:
@@ -79,6 +79,13 @@ def register_function(name: str, function: Function) -> None:
     _functions[name] = function
 
 
+def _degree_of(kind: str) -> int:
+    """The highest degree of what such features are products of."""
+    if kind not in _POLYNOMIALS:
+        return 1
+    return int(kind.removeprefix("degree")) if kind.startswith("degree") else 2
+
+
 def functions_of(entries: Iterable[str]) -> dict[str, Function]:
     """Registered functions that entries of ``ModelConfig.features`` name, by name."""
     kinds = [match["kind"] for entry in entries if (match := _ENTRY.fullmatch(entry))]
@@ -87,7 +94,7 @@ def functions_of(entries: Iterable[str]) -> dict[str, Function]:
 
 def known_kinds() -> tuple[str, ...]:
     """All kinds of features that there are, registered functions last."""
-    return ("trig", *_DEGREES, *sorted(_functions))
+    return ("trig", *_POLYNOMIALS, *sorted(_functions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,8 +213,8 @@ class Library:
     def _simplest(self, names: Sequence[str], own: Sequence[bool]) -> tuple[list[Atom], list[Feature]]:
         """The factors of products, and the features that are none."""
         turning = [k for k, name in enumerate(names) if own[k] and self._turns(name)]
-        waves = [Atom(k, f, w) for k in turning for w in FREQUENCIES for f in ("sin", "cos")]
-        users = [kind for kind in self.kinds if kind not in {"trig", *_DEGREES}]
+        waves = [Atom(k, f, w) for k in turning for w in DEGREES for f in ("sin", "cos")]
+        users = [kind for kind in self.kinds if kind not in {"trig", *_POLYNOMIALS}]
         for kind in users:
             _registered(kind)
         named = [Atom(k, f) for f in users for k in range(len(names))]
@@ -217,7 +224,7 @@ class Library:
 
     @property
     def _degree(self) -> int:
-        return max((_DEGREES.get(kind, 1) for kind in self.kinds), default=1)
+        return max(map(_degree_of, self.kinds), default=1)
 
     def _turns(self, name: str) -> bool:
         return "trig" in self.kinds and (
@@ -321,9 +328,9 @@ def _parsed(entry: str) -> tuple[str | None, str, list[str]]:
     """Type that an entry is for (``None``: all), its kind, and the properties that it names."""
     match = _ENTRY.fullmatch(entry)
     kind = match["kind"] if match else entry
-    if match is None or (kind != "trig" and (match["names"] or kind not in {*_DEGREES, *_functions})):
+    if match is None or (kind != "trig" and (match["names"] or kind not in {*_POLYNOMIALS, *_functions})):
         raise ConfigError(
-            f"features: {entry!r} is unknown; expected 'trig', 'trig(property)', {sorted(_DEGREES)}, or a function "
+            f"features: {entry!r} is unknown; expected 'trig', 'trig(property)', {sorted(_POLYNOMIALS)}, or a function "
             f"registered before, of which there are {sorted(_functions)}; 'type:kind' offers it to one type only"
         )
     return match["type"], kind, [name.strip() for name in (match["names"] or "").split(",") if name.strip()]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relgym.config.constants import (
     ENOUGH,
+    MAJORITY,
     NEARLY_ALL,
     RECENT,
     ROUGH,
@@ -147,11 +148,11 @@ def _least_spread(
 def _quartile(spreads: list[tuple[float, int]]) -> float:
     """Standard deviation whose estimates from as many windows would have this lower quartile."""
     values, freedom = [s for s, _ in spreads], float(np.mean([f for _, f in spreads]))
-    quarter = 0.25
+    quarter = 0.5 * MAJORITY  # the median of the smaller half
     share = (quarter * (len(values) - 1) + 0.5) / len(values)
-    part = 2.0 / (9.0 * freedom)  # Wilson and Hilferty's quantile of chi-square
-    ratio: float = (1.0 - part + NormalDist().inv_cdf(share) * part**0.5) ** 3
-    return float(np.quantile(values, quarter)) / math.sqrt(ratio)
+    # Of a chi-square twice the root is nearly normal about sqrt(2 freedom - 1), with a deviation of 1 (Fisher 1922).
+    root = math.sqrt(2.0 * freedom - 1.0) + NormalDist().inv_cdf(share)
+    return float(np.quantile(values, quarter)) * math.sqrt(2.0 * freedom) / root
 
 
 def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:

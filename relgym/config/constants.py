@@ -11,6 +11,8 @@ import sys
 from statistics import NormalDist
 from typing import Final
 
+import numpy as np
+
 __all__ = [
     "ACTING",
     "ALIKE",
@@ -20,13 +22,11 @@ __all__ = [
     "BEYOND",
     "CACHED",
     "CALL",
-    "CHAIN_PLANS",
     "CHECKPOINT",
-    "CHECK_AT",
     "COVERED",
+    "DEGREES",
     "DIGITS",
     "DRAWS",
-    "DRAW_DIVISORS",
     "ENOUGH",
     "EVIDENCE",
     "EXACT",
@@ -37,7 +37,6 @@ __all__ = [
     "FIRST",
     "FIRST_ROOM",
     "FOUNDING",
-    "FREQUENCIES",
     "LARGE",
     "LAYOUTS",
     "LEAST_EXEMPLARS",
@@ -59,8 +58,6 @@ __all__ = [
     "OFTEN",
     "OUTLYING",
     "PAIRS",
-    "PATIENCE",
-    "POWERS",
     "RECENT",
     "REPAID",
     "REPEATED",
@@ -83,9 +80,7 @@ __all__ = [
     "SWEEPS",
     "TOLD",
     "TYPICAL",
-    "UNIT",
     "VERIFYING",
-    "WEIGHT_PARTS",
     "WIDE",
 ]
 
@@ -93,9 +88,13 @@ __all__ = [
 EVIDENCE: Final = 10.0
 """Bits by which evidence must lead before anything is changed for it: such a lead misleads once in 2^10 times."""
 
-EXACT: Final = 24.0
+MOST_ROWS: Final = 3_000
+"""Examples that are kept for, or looked at in, one fit at most, the newest or some spread over time: more tell weights
+and spreads to less than 2 %, 1 / sqrt(n), of what they can't explain."""
+
+EXACT: Final = float(math.ceil(2 * math.log2(MOST_ROWS)))
 """Bits by which an example of exact data verifies a function that it fits, at least: few such examples are enough. Two
-agree by chance once in 2^24 times, so that of all pairs of a few thousand hardly one does."""
+agree by chance once in 2^24 times, so that of all pairs of `MOST_ROWS` hardly one does."""
 
 VERIFYING: Final = 2
 """Rows of a random sample that verify a function, besides those that fix its numbers: the second one shows most of
@@ -124,12 +123,12 @@ explained by chance, what happens at a border."""
 COVERED: Final = 0.95
 """Share of what comes that intervals are to hold: two standard deviations, if errors are normal."""
 
-TOLD: Final = 100.0
+TOLD: Final = float(round(SMALL**-2))
 """A change of so many tolerances tells a weight to 1 %; numbers that differ by less tell nothing, and what is estimated
 is of the same order up to so many times as much."""
 
 LITTLE: Final = 1.0 / TOLD
-"""A hundredth of something is little beside it."""
+"""A hundredth of something, a small part of a small part of it, is little beside it."""
 
 LEFT_OPEN: Final = 2.0 * LITTLE
 """Share of its examples that a law may leave unexplained: contacts that no engine settles, corners. The bits of so many
@@ -160,9 +159,9 @@ others, or to 1, is relatively smaller is collinear with them."""
 SAME_DIGITS: Final = round(-math.log10(ROUNDED))
 """Digits to which numbers agree that differ by rounding: those of `ROUNDED`."""
 
-ALIKE: Final = 1e-6
+ALIKE: Final = ROUNDED * 2.0**EVIDENCE
 """What differs by so small a share, or by so many bits, is the same though it was found in another way, fitted to other
-examples or summed up from squares of what differs by rounding: a thousand times `ROUNDED`."""
+examples or summed up from squares of what differs by rounding: as far as a sum of a thousand numbers does."""
 
 ROUNDINGS: Final = 32.0
 """Roundings that a function of a few terms on differences of stored numbers carries at most: each of some eight terms
@@ -178,14 +177,14 @@ of 1 / `RESOLUTION`, so that their sums are exact, in whatever order."""
 NUMBER_BITS: Final = 1.0 + math.log2(RESOLUTION)
 """Bits of a number that nothing tells: its sign, and which of `RESOLUTION` tolerances it has."""
 
-SUMMABLE: Final = 10.0 ** math.floor(math.log10(math.sqrt(sys.float_info.max / 2**53)))
+SUMMABLE: Final = math.sqrt(sys.float_info.max / 2**sys.float_info.mant_dig)
 """Numbers up to this can be multiplied, and 2^53 of the products be summed, before a float64 overflows."""
 
 OUTLYING: Final = 32.0
 """A number this much larger than what is known of its property is suspicious; so of `FIRST` suspicious ones `ENOUGH`
 within this factor of one another are no errors."""
 
-REPEATED: Final = 5
+REPEATED: Final = 1 + 2 * VERIFYING
 """So many numbers as large must have come for a magnitude to be known: one or two outliers, each of which is seen after
 one step and before the next one, don't widen the limit. So many suspicious ones that are exactly equal are no errors
 (rewards, codes), nor are so many in successive transitions (another scale)."""
@@ -200,8 +199,9 @@ OFTEN: Final = 1.0 + MAJORITY
 before the latest one cost twice as much as that."""
 
 SELDOM: Final = 4
-"""What shouldn't come and go, such as the noise, is estimated anew when there are so many times as many examples: what
-is left to chance is half as much then."""
+"""What shouldn't come and go, such as the noise and the order of targets, is estimated anew when there are so many
+times as many examples: what is left to chance is half as much then. A search draws so many times fewer random samples
+where it looks at more than the fewest columns, and again where at more than `WIDE`, since each costs the more."""
 
 ENOUGH: Final = FIRST // SELDOM
 """Examples that tell roughly how large something is: a standard deviation to 18 %, 1 / sqrt(2 n), half as well as
@@ -215,24 +215,17 @@ FEW_VALUES: Final = FIRST
 """Numbers that take no more values than what is fitted first has examples are a choice among a few, or count something:
 pixels, cells, actions."""
 
-RECENT: Final = 200
-"""Latest examples that tell how things stand at present: five times what the thesis' modes need, so that there is a law
-among them, or it is doubtful that there is one. A share of them is known to 3.5 %, 1 / sqrt(4 n)."""
+RECENT: Final = round(max(FOUNDING) / (2.0 * SMALL))
+"""Latest examples that tell how things stand at present: enough to found a mode that is a fifth of them, so that there
+is a law among them, or it is doubtful that there is one. A share of them is known to 3.5 %, 1 / sqrt(4 n)."""
 
 MEMORY: Final = round(2.0**EVIDENCE)
 """Latest trials that tell how right predictions are, so many that evidence misleads in one of them; of more the older
 ones count half. From half as many a share of 99 % is known to 0.4 %, and a lead of 10 bits is one of 1.4 % in root
 mean square."""
 
-OCTAVE: Final = 4
-"""Bins of errors' sizes in an octave: an interval is 19 % too wide at most."""
-
-WEIGHT_PARTS: Final = 64
-"""Weights of examples are rounded to such parts of one: residues of rounding would pass for examples."""
-
-MOST_ROWS: Final = 3_000
-"""Examples that are kept for, or looked at in, one fit at most, the newest or some spread over time: more tell weights
-and spreads to less than 2 %, 1 / sqrt(n), of what they can't explain."""
+OCTAVE: Final = math.ceil(1.0 / math.log2(1.0 + 2.0 * SMALL))
+"""Bins of errors' sizes in an octave: so many that an interval is a fifth too wide at most."""
 
 SEARCHED_ROWS: Final = round(max(FOUNDING) / SMALL)
 """Examples among which functions are searched for at a time: there are enough to found a mode that is a tenth of them,
@@ -240,9 +233,6 @@ and all their distances take 1.3 MB. What is found is fitted to more."""
 
 LEAST_EXEMPLARS: Final = round(min(FOUNDING) / SMALL)
 """Classified examples that are kept whatever memory they take: enough of each mode of ten."""
-
-CHECK_AT: Final = tuple(48 * SELDOM**k for k in range(4))
-"""Numbers of examples of a type after which the order of its targets is looked at again."""
 
 # ---------------------------------------------------------------------- searches, and what they may cost
 ALTERNATIVES: Final = 4
@@ -259,11 +249,9 @@ and how often that is done: a budget, of 400 sweeps."""
 SHORT: Final = 3
 """Literals of a definition so short that a faultless one is taken as it is: hardly anything shorter would be found."""
 
-POWERS: Final = (1, 2, 3)
-"""Powers of extents that inertia and shares may go with: length, area, volume."""
-
-FREQUENCIES: Final = (1, 2, 3)
-"""Multiples of an angle of which sines and cosines are offered as columns: higher ones are seldom seen in a law."""
+DEGREES: Final = (1, 2, 3)
+"""Low degrees, as laws have them: powers of extents that inertia and shares may go with (length, area, volume), and
+multiples of an angle of which sines and cosines are offered, polynomials of such degrees in its sine and cosine."""
 
 DRAWS: Final = math.ceil(math.log(LEFT_OPEN) / math.log1p(-((2.0 * SMALL) ** 2)))
 """Random samples of two rows: of what holds for a fifth of the rows, all but one in fifty searches draws a sample."""
@@ -271,13 +259,9 @@ DRAWS: Final = math.ceil(math.log(LEFT_OPEN) / math.log1p(-((2.0 * SMALL) ** 2))
 WIDE: Final = max(FOUNDING)
 """Searches of more columns than found a mode as examples draw fewer and larger samples, and choose in a cheaper way."""
 
-DRAW_DIVISORS: Final = (1, 3, 12)
-"""How many times fewer random samples a search draws that looks at the fewest columns, at up to `WIDE`, at more: a
-budget, since each costs the more."""
-
-SAMPLES_ALIKE: Final = 6
-"""Random samples that chose the same columns and are tried on all rows, at most: where one in three is of one mode,
-none of six is in a tenth of all searches, and the next search draws others."""
+SAMPLES_ALIKE: Final = math.ceil(math.log(LEFT_OPEN) / math.log1p(-MAJORITY))
+"""Random samples that chose the same columns and are tried on all rows, at most: where every other one is of one mode,
+some of six is in all but one of fifty searches, and the next search draws others."""
 
 SAMPLES_TRIED: Final = 2 * ALTERNATIVES * SAMPLES_ALIKE
 """Random samples that are tried on all rows in one search, at most: those of eight sets of columns."""
@@ -285,9 +269,6 @@ SAMPLES_TRIED: Final = 2 * ALTERNATIVES * SAMPLES_ALIKE
 SCENE_ROWS: Final = 1 + VERIFYING
 """Rows of each scene in a random sample of a few scenes: one tells what is constant in it, the others what changes. Of
 two scenes, the fewest, half of the six rows verify a function of a present value, an action and what is constant."""
-
-CHAIN_PLANS: Final = ((2, 5, 256), (4, 10, 128))
-"""Terms, sample size and draws of the searches for a law of a next value that another one explains."""
 
 MOST_FEATURES: Final = 2 * MOST_ROWS
 """Columns that are made of others, at most: of `MOST_ROWS` rows they take 144 MB, and a search takes minutes."""
@@ -298,30 +279,21 @@ SEARCHED_CELLS: Final = 1_000_000
 CALL: Final = 25_000
 """What a few array operations cost however few numbers they look at, in cells: a tenth of a millisecond."""
 
-UNIT: Final = 12
-"""Cells that one unit of `ModelConfig.work_per_step` stands for."""
-
 # ---------------------------------------------------------------------- room and machines
 PAIRS: Final = 10_000
 """Pairs of bodies that one step looks at, at most, as many as a hundred bodies make: a budget."""
 
-NEAREST: Final = 32
-"""About so many bodies, at least one of each type, make a small scene."""
+NEAREST: Final = round(math.sqrt(SMALL * PAIRS))
+"""About so many bodies, at least one of each type, make a small scene: their pairs are a small part of `PAIRS`."""
 
 MOST_TARGETS: Final = 256
 """Properties that one model learns, at most: of more a step would take seconds."""
 
-MOST_STEPS: Final = 10**9
-"""Steps of a roll-out, whose predictions all lie in memory: no machine holds more."""
+MOST_STEPS: Final = int(np.iinfo(np.int32).max)
+"""Steps of a roll-out, whose predictions all lie in memory: no machine holds more than 32 bits can count."""
 
 CHECKPOINT: Final = 1_000
 """A checkpoint is taken after so many steps at the latest: a rollback takes as long as so many steps."""
-
-ANSWERS: Final = 4_096
-"""Answers of a kind that are remembered only to be quicker; before there are more, all are forgotten."""
-
-LAYOUTS: Final = 256
-"""Layouts of scenes of which something is remembered only to be quicker; before there are more, all are forgotten."""
 
 MEBIBYTE: Final = 1 << 20
 """Bytes of what settings call a megabyte."""
@@ -329,15 +301,24 @@ MEBIBYTE: Final = 1 << 20
 MOST_BYTES: Final = 32 * MEBIBYTE
 """Memory of what is remembered only to be quicker, and of one array that is worked on: a few of them fit anywhere."""
 
-FIRST_ROOM: Final = 256
-"""Rows that a growing array has room for at first, and for at least so many more whenever it is full."""
+FIRST_ROOM: Final = FIRST * SELDOM
+"""Rows that a growing array has room for at first, and for at least so many more whenever it is full: as many as there
+are when what shouldn't come and go is estimated for the second time."""
 
-MORE_ROOM: Final = 0.125
-"""Share by which an array that is full grows, as CPython's lists do: a row is copied some eight times in all. A
-regression is solved anew when there are so many rows more: it lags by a ninth of them at most."""
+MORE_ROOM: Final = SMALL
+"""Share by which an array that is full grows: a row is copied some ten times in all. A regression is solved anew when
+there are so many rows more: it lags by an eleventh of them at most."""
 
 CACHED: Final = 1 << 14
 """Numbers that are worked on at once where more would be, 128 kB: with what is made of them they fit a core's cache."""
+
+LAYOUTS: Final = MOST_BYTES // (CACHED * np.float64().nbytes)
+"""Layouts of scenes of which something is remembered only to be quicker, each in the room of so many numbers; before
+there are more, all are forgotten."""
+
+ANSWERS: Final = MOST_BYTES // (MEMORY * np.float64().nbytes)
+"""Answers of a kind, of a thousand numbers at most, that are remembered only to be quicker; before there are more, all
+are forgotten."""
 
 LARGE: Final = CACHED
 """Bytes of an array from which on it is copied beside what is serialised, no longer with it: an eighth of that."""
@@ -345,10 +326,6 @@ LARGE: Final = CACHED
 REPAID: Final = 128
 """Times something is asked before that is made which answers sooner: to make it takes as long (rent or buy: Karlin et
 al. 1988). So the kernel, 60 ms to load, where arrays take half a millisecond; and tables of what is asked again."""
-
-PATIENCE: Final = 2
-"""A program is lowered for the last of so many scenes that are asked since what a model says has changed; arrays answer
-those before it, which takes about as long as to lower it (rent or buy: Karlin et al. 1988)."""
 
 DIGITS: Final = 7
 """Significant digits of numbers in formulas, unless somebody asks for others."""

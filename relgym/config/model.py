@@ -32,14 +32,10 @@ class ModelConfig:
         Whether a situation that differs from all seen ones in what the clauses look at is called *outside experience*
         instead of being predicted, and one where no mode explained what followed *unexplained*
         (`relgym.model.target.scope`). Default true; false: the votes decide there as everywhere.
-    work_per_step
-        Budget for re-learning classifiers after one transition, in deterministic units of twelve cells (see
-        `cells_per_step`). Default 400,000, 20 ms at most, range 0 to 10**12. Raising it makes rules fresher and single
-        steps slower.
     cells_per_step
-        What each transition earns for searches (for modes, approximations, causal order, guesses, and what
-        `work_per_step` counts), in cells: numbers looked at, of which a thousand million take one to four seconds.
-        Default 500,000, 2 ms at most, range 1 to 10**15. A search that takes more than there is goes on after the next
+        What each transition earns for searches (for modes, approximations, causal order, guesses and clauses), in
+        cells: numbers looked at, of which a thousand million take one to four seconds. Default 500,000, 2 ms at most,
+        range 1 to 10**15. A search that takes more than there is goes on after the next
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
     most_cells
@@ -100,7 +96,6 @@ class ModelConfig:
     seed: int = 0
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
-    work_per_step: int = 400_000
     cells_per_step: int = 500_000
     most_cells: int = 5_000_000
     saved_cells: int = 1_000_000_000
@@ -120,10 +115,10 @@ class ModelConfig:
             if not isinstance(getattr(self, name), kind):
                 raise ConfigError(f"{name} must be a {kind.__name__}, got {getattr(self, name)!r}")
         one_of(self, geometry=("arrays", "fcl"), frames=("auto", "world"))
-        at_least(self, 0, "seed", "work_per_step", "saved_cells")
+        at_least(self, 0, "seed", "saved_cells")
         at_least(self, 1, "cells_per_step", "most_cells")
         at_least(self, 100, "history")
-        at_most(self, work_per_step=10**12, history=10**9)
+        at_most(self, history=10**9)
         at_most(self, cells_per_step=10**15, most_cells=10**15, saved_cells=10**15)
         at_least(self, 0, "regression_columns")
         for name in ("claim_error", "claim_probability", "claim_slips"):

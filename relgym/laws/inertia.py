@@ -17,7 +17,17 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ALIKE, DIGITS, DRAWS, FEWEST, LEFT_OPEN, LITTLE, POWERS, SAME_DIGITS, TOLD
+from relgym.config.constants import (
+    ALIKE,
+    DEGREES,
+    DIGITS,
+    DRAWS,
+    FEWEST,
+    LEFT_OPEN,
+    LITTLE,
+    SAME_DIGITS,
+    TOLD,
+)
 from relgym.laws.description import CONSTANT_BITS, EXCEPTION_BITS
 from relgym.laws.records import ONE, Piece
 from relgym.scene.geometry.vectors import FloatArray, dot
@@ -396,7 +406,7 @@ def _factors(names: Iterable[str]) -> Iterator[tuple[tuple[str, int], ...]]:
     """Products of powers, the plainest first."""
     yield ()
     names = [name for name in names if name != SQUARE]
-    for power in POWERS:
+    for power in DEGREES:
         yield from (((name, power),) for name in names)
     yield from (((a, 1), (b, 1)) for a, b in combinations(names, 2))
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import FEWEST, LEFT_OPEN, POWERS, ROUNDED, TOLD
+from relgym.config.constants import DEGREES, FEWEST, LEFT_OPEN, ROUNDED, TOLD
 from relgym.laws.records import Share
 from relgym.scene.geometry.vectors import FloatArray, dot
 
@@ -80,7 +80,7 @@ def _trivial(
 
 def _candidates(names: list[str], median: float, *, alike: bool) -> list[Share]:
     found = [Share(constant=0.5)]
-    found += [Share(name, power) for power in POWERS for name in names]
+    found += [Share(name, power) for power in DEGREES for name in names]
     if not alike:
         found.append(Share(constant=median))
     return found

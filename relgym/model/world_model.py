@@ -18,7 +18,7 @@ from relgym.arguments import array_of, refusing, whole
 from relgym.clustering.mode import Mode
 from relgym.config import ModelConfig
 from relgym.config.checks import checked_count
-from relgym.config.constants import ALL_DIGITS, DIGITS, MOST_STEPS, PATIENCE, SUMMABLE
+from relgym.config.constants import ALL_DIGITS, DIGITS, MOST_STEPS, SUMMABLE
 from relgym.errors import ConfigError, ModelFileError, ObservationError, QueryError, RelgymError
 from relgym.files.reading import FileLimits
 from relgym.html import html_text
@@ -783,8 +783,7 @@ class WorldModel:
             return None
         if on_card:
             KERNEL.load()
-            scenes = max(scenes, PATIENCE)
-        return self._programs.of(self._parts, layout, scenes)
+        return self._programs.of(self._parts, layout, scenes, at_once=on_card)
 
     @refusing(ConfigError)
     def describe(

@@ -30,6 +30,7 @@ from relgym.config.constants import (
     EXTRAPOLATED,
     LITTLE,
     ROUNDED,
+    ROUNDS,
     SAMPLES_ALIKE,
     SAMPLES_TRIED,
     STDS,
@@ -214,8 +215,8 @@ def consensus(
 def refine(
     x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, *, sigma: float, tolerance: float
 ) -> Steps[Consensus]:
-    """Refit on the inliers, drop needless terms and count again until nothing changes; at most 8 rounds."""
-    for round_ in range(8):
+    """Refit on the inliers, drop needless terms and count again until nothing changes; at most `ROUNDS` rounds."""
+    for round_ in range(ROUNDS):
         if found.size <= len(found.fit.columns) + 1:
             return Consensus(found.fit, np.zeros(len(y), dtype=bool))
         fit = least_squares(x[found.inliers], y[found.inliers], found.fit.columns)

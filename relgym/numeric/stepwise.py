@@ -111,12 +111,15 @@ def least_squares(
 
 def fitting_cells(rows: int, terms: int) -> int:
     """What `least_squares` of so many rows and terms costs, in cells: each term is taken out of all others, twice."""
-    return CALL + terms * (CALL // 4 + rows * (terms + 1))
+    return (1 + terms) * (CALL // 2 + rows * terms)
 
 
 def choosing_cells(cells: int, terms: int = 1) -> int:
-    """What it costs to choose so many columns among so many numbers: four passes over these for each."""
-    return CALL + 4 * cells * max(terms, 1)
+    """What it costs to choose so many columns among so many numbers, in cells.
+
+    Each takes two passes over these to be found and two to be swept out of the others.
+    """
+    return CALL + (2 + 2) * cells * max(terms, 1)
 
 
 def _combine(a: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:

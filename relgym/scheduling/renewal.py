@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["due"]
+__all__ = ["came_due", "due"]
 
 
 def due(seen: int, first: int, times: float = 2) -> bool:
@@ -31,3 +31,16 @@ def due(seen: int, first: int, times: float = 2) -> bool:
     while first < seen:
         first = math.ceil(times * first)
     return seen == first
+
+
+def came_due(before: int, seen: int, first: int, times: float = 2) -> bool:
+    """Whether one of the examples after the first `before` of `seen` was one at which it is `due`.
+
+    Examples
+    --------
+    >>> came_due(60, 64, 64), came_due(64, 127, 64), came_due(64, 300, 64)
+    (True, False, True)
+    """
+    while first <= before:
+        first = math.ceil(times * first)
+    return first <= seen

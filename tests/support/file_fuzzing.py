@@ -20,7 +20,6 @@ import numpy as np
 from file_mutations import Arrays, Mutator
 from numpy.typing import NDArray
 
-from relgym.config.constants import PATIENCE
 from relgym.envs.dreams.env import LearnedModelEnv
 from relgym.errors import RelgymError
 from relgym.files.reading import ARCHIVE, read_members
@@ -114,7 +113,7 @@ def _compile(path: Path, steps: dict[str, list[Transition]]) -> None:
     """Have the kernel that runs models, which takes longer to compile than any case may."""
     KERNEL.load()
     model, scene = WorldModel.load(path), steps[path.stem][0].before
-    for _ in range(PATIENCE + 1):
+    for _ in range(3):
         model.predict_one(scene)
         model.predict_batch(scene.layout, scene.vector[None])
 

@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 FORMAT: Final = "relgym-model"
-VERSION: Final = 5
+VERSION: Final = 6
 """Files of all versions are read: `relgym.model.files.upgrade` says what has changed. Version 1 had no checksum of the
 history."""
 

@@ -34,6 +34,9 @@ _RETIRED: Final[dict[str, dict[str, Any]]] = {
 }
 """Settings that there were before version 3, with the values of which the present rules are made."""
 
+_BUDGETS: Final = frozenset({"work_per_step"})
+"""Budgets that there were before version 6; learning goes on within those that there are."""
+
 
 def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
     """A body as the present version has it.
@@ -50,13 +53,15 @@ def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
     UserWarning
         The model was learned with a setting that is gone, and with another value of it than the present rules have.
     """
-    if version >= 5:
+    if version >= 6:
         return body
     found = dict(body)
+    if isinstance(body.get("config"), dict):
+        found["config"] = _without_retired(body["config"], version)
+    if version >= 5:
+        return found
     if isinstance(body.get("regressions"), dict):
         found["regressions"] = {name: _with_say(each) for name, each in body["regressions"].items()}
-    if version < 3 and isinstance(body.get("config"), dict):
-        found["config"] = _without_retired(body["config"])
     if isinstance(body.get("calibration"), dict):
         found["calibration"] = {
             name: _one_regression(_completed(each, version)) for name, each in body["calibration"].items()
@@ -64,10 +69,11 @@ def upgraded(body: dict[str, Any], version: int) -> dict[str, Any]:
     return found
 
 
-def _without_retired(config: Mapping[str, Any]) -> dict[str, Any]:
+def _without_retired(config: Mapping[str, Any], version: int) -> dict[str, Any]:
     """Settings without those that are gone."""
-    found, other = dict(config), []
-    for part, retired in _RETIRED.items():
+    found = {name: value for name, value in config.items() if name not in _BUDGETS}
+    other: list[str] = []
+    for part, retired in _RETIRED.items() if version < 3 else ():
         given = config.get(part)
         if not isinstance(given, dict):
             continue

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.clusterer import ClusterReport
-from relgym.config.constants import CHECK_AT, UNIT
+from relgym.config.constants import FOUNDING, SELDOM
 from relgym.html import html_table
 from relgym.model.learning.forgetting import forget
 from relgym.model.learning.stillness import recall
@@ -24,6 +24,7 @@ from relgym.model.target.hindsight import Confirmed
 from relgym.model.target.property_model import bodies_of
 from relgym.scene.objects import TASK, Target, Transition
 from relgym.scheduling.agenda import Budget
+from relgym.scheduling.renewal import came_due
 
 __all__ = ["NOTHING", "LearnReport", "finish", "learn"]
 
@@ -42,7 +43,7 @@ class LearnReport:
         Per (object, property): what its clusterer did; not for targets whose modes rest, since laws suffice, nor for
         what came as predicted and isn't learned from, since others stand for it (`Calibration.confirm`, `thin`).
     work
-        Deterministic units of work spent on re-learning classifiers.
+        Cells (`ModelConfig.cells_per_step`) spent on re-learning classifiers.
     set_aside
         Whether the transition held a gross error and wasn't learned from (`relgym.model.percepts.screening`).
     counted
@@ -65,7 +66,7 @@ class LearnReport:
             (f"{name}.{prop}", part.mode, _ids(part.fits), _ids(part.created), _ids(part.removed))
             for (name, prop), part in self.parts.items()
         ]
-        return html_table(f"Learned; re-learning took {self.work:,} units of work", head, rows)
+        return html_table(f"Learned; re-learning took {self.work:,} cells", head, rows)
 
 
 def _ids(modes: tuple[int, ...]) -> str:
@@ -116,7 +117,7 @@ def learn(
         table = parts.tables[target.type]
         recall(parts, target, len(table) - table.seen + rows.get(target.type, 0), searches)
     for type_name, table in parts.tables.items() if reports else ():
-        if parts.open and any(rows[type_name] < at <= table.seen for at in CHECK_AT):
+        if parts.open and came_due(rows[type_name], table.seen, max(FOUNDING), SELDOM):
             parts.looks += due(parts, type_name)
         forget(table, [model for _, model in parts.by_type[type_name]], parts.config.history)
     _inquire(parts, budget)
@@ -210,7 +211,7 @@ def finish(parts: Parts) -> int:
     for type_name, regression in parts.regressions.items():
         regression.settle()
         _tell_regressed(parts, type_name)
-    return work + budget.spent // UNIT
+    return work + budget.spent
 
 
 def _learn_object(
@@ -273,16 +274,15 @@ def _tell_regressed(parts: Parts, type_name: str) -> None:
 
 
 def _refresh(parts: Parts, budget: Budget) -> int:
-    """Re-learn stale classifiers and guess anew within both budgets; the work spent on classifiers."""
+    """Re-learn stale classifiers and guess anew within the budget; the cells spent on classifiers."""
     spent = 0
     for target in parts.targets:
-        allowed = min(parts.config.work_per_step - spent, budget.left // UNIT)
-        if allowed <= 0:
+        if not budget.left:
             break
         if not parts.governs(target):  # no clause is asked where laws predict
             model = parts.models[target]
-            work = model.refresh(allowed)
-            budget.spend(UNIT * work)
+            work = model.refresh(budget.left)
+            budget.spend(work)
             spent += work
             model.reconsider(parts.tables[target.type], budget)
     return spent

@@ -47,7 +47,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import Any, Final, NamedTuple
@@ -100,8 +100,8 @@ _VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
-_EXACT: Final = -(1 << 14)
-"""The bin of errors no larger than rounding."""
+_EXACT: Final = OCTAVE * (sys.float_info.min_exp - sys.float_info.mant_dig) - 1
+"""The bin of errors no larger than rounding: below that of any number."""
 
 _DEFAULT: Final = ModelConfig()
 
@@ -237,8 +237,9 @@ class _Record:
 
     def add(self, hit: bool, times: int, *, fitted: bool) -> None:
         """Take in a value that nobody claims, so that no run of hits or misses needs to be noticed at once."""
-        if fitted and self.trials:  # weights of (i / n)^2 sum to n / 3
-            kept = max(1.0 - 2.0 * times / (3.0 * self.trials), 0.0)
+        if fitted and self.trials:  # weights of (i / n)^power sum to n / (power + 1)
+            power = 2.0
+            kept = max(1.0 - power * times / ((power + 1.0) * self.trials), 0.0)
             self.trials, self.hits = kept * self.trials, kept * self.hits
         self.trials += times
         self.hits += times * hit
@@ -1256,7 +1257,7 @@ class Calibration:
         found._slips = [float(each) for each in data["slips"]]
         found._vouched = float(data["vouched"])
         found._proven = int(data.get("proven", 0))
-        found._changes = {int(place): float(count) for place, count in data["changes"]}
+        found._changes = _bins(data["changes"])
         found._waiting = [
             _Waiting(
                 Key(*map(int, key)),
@@ -1272,7 +1273,7 @@ class Calibration:
                     float(n),
                     float(hits),
                     int(run),
-                    {int(k): float(c) for k, c in bins},
+                    _bins(bins),
                     [*map(float, runs), 0.0, 0.0][:6],
                     int(next(iter(runs[6:]), 0)),
                 )
@@ -1379,6 +1380,11 @@ def _place(error: float) -> int:
     if error <= 0.0:
         return _EXACT
     return math.ceil(OCTAVE * math.log2(min(error, SUMMABLE)))
+
+
+def _bins(data: Iterable[tuple[int, float]]) -> dict[int, float]:
+    """Bins as files have them; in those of before that of exact hits lies farther below."""
+    return {max(int(place), _EXACT): float(count) for place, count in data}
 
 
 def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, float]:

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 
 from relgym.clustering.columns import PRIME, SlotSignature
 from relgym.clustering.discovery import Scale, identified, is_law, law_cells
-from relgym.config.constants import ALIKE, CHAIN_PLANS, ENOUGH, NEARLY_ALL, SEARCHED_ROWS
+from relgym.config.clustering import ClusteringConfig
+from relgym.config.constants import ALIKE, DRAWS, ENOUGH, NEARLY_ALL, SEARCHED_ROWS, VERIFYING
 from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import LinearFit
 from relgym.scene.objects import TASK, Target
@@ -139,8 +140,8 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     order = _columns(slots, replace(target, given=free))
     x, y = slots.matrix(table.x[clusterer.rows[recent]], order), clusterer.y[recent]
     scales = tuple(dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale)))
-    seed, support = parts.config.seed, parts.config.clustering.support
-    task = Task(_better, x, y, slots, order, scales, share=share, size=size, seed=seed, support=support)
+    config, seed = parts.config.clustering, parts.config.seed
+    task = Task(_better, x, y, slots, order, scales, share=share, size=size, config=config, seed=seed)
     return Inquiry(look, target, task)
 
 
@@ -154,8 +155,8 @@ def _better(
     *,
     share: float,
     size: float,
+    config: ClusteringConfig,
     seed: int,
-    support: int,
 ) -> Steps[_Found | None]:
     """The law with next values that explains more of some rows than modes do, or as many more briefly.
 
@@ -171,10 +172,11 @@ def _better(
         That of rounding alone, and that which is assumed, if it is another one.
     share, size
         Share of the rows that modes explain, and parameters of the largest one.
-    seed, support
+    config, seed
         As in the configuration.
     """
-    for scale, (terms, sample, draws) in itertools.product(scales, CHAIN_PLANS):
+    lengths = sorted({min(2, config.max_terms), config.max_terms})
+    for scale, terms in itertools.product(scales, lengths):
         rng = np.random.default_rng([seed, len(y)])
         found = yield from consensus.steps(
             x,
@@ -182,13 +184,13 @@ def _better(
             sigma=scale.sigma,
             tolerance=scale.tolerance,
             terms=terms,
-            size=sample,
-            draws=draws,
+            size=terms + 1 + VERIFYING,
+            draws=DRAWS,
             rng=rng,
             misfit=scale.misfit,
         )
         if found is not None:
-            found = yield from identified.steps(x, y, found.fit, scale=scale, support=support)
+            found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
         if found is None or 2 * found.size < len(y) or not is_law(x, y, found, x.shape[1], scale):
             continue
         gain, little = found.size / len(y) - share, 1.0 - NEARLY_ALL

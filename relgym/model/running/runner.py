@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relgym.clustering.columns import SlotSignature
-from relgym.config.constants import PATIENCE, REPAID
+from relgym.config.constants import REPAID
 from relgym.model.parts import Parts
 from relgym.model.percepts.perception import Percept, Situation
 from relgym.model.percepts.scenes import scene_of, wrap
@@ -111,7 +111,7 @@ class Programs:
         self._declined = self._resting = 0 if said is not None else min(2 * self._declined + 1, REPAID)
         return said
 
-    def of(self, parts: Parts, layout: SceneLayout, scenes: int) -> Runner | None:
+    def of(self, parts: Parts, layout: SceneLayout, scenes: int, *, at_once: bool = False) -> Runner | None:
         """What runs the program for a layout; None: arrays answer.
 
         Parameters
@@ -122,6 +122,8 @@ class Programs:
             The scenes' layout.
         scenes
             How many are asked.
+        at_once
+            Whether a program is lowered for them whether that pays or not.
         """
         if (machine := KERNEL.after(scenes)) is None:
             return None
@@ -133,8 +135,9 @@ class Programs:
                 known.runner.follow()
             known.changes = self.changes
             return known.runner
+        alone = _alone(self._asked, scenes)
         self._asked += scenes
-        if self._asked < PATIENCE:
+        if alone and not at_once:
             return None
         runner: Runner | None
         try:
@@ -612,6 +615,14 @@ class _Teller:
         for role in known.roles:
             names[role.number + 1] = self._body_names[int(players[role.number])]
         return tuple(name for name in names if name is not None)
+
+
+def _alone(asked: int, scenes: int) -> bool:
+    """Whether a scene is the only one that was asked since what a model says has changed.
+
+    To lower a program takes about as long as arrays take to answer one scene (rent or buy: Karlin et al. 1988).
+    """
+    return asked + scenes < 2
 
 
 def _spreads(

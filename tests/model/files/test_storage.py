@@ -229,7 +229,7 @@ def test_no_changed_byte_goes_unnoticed(
         ("", "truncated"),
         ("[1, 2]", "another kind of JSON"),
         ("{}", "another kind of JSON"),
-        ('{"format": "relgym-model", "version": 99}', "version 1 to 5, got 99"),
+        ('{"format": "relgym-model", "version": 99}', "version 1 to 6, got 99"),
         ('{"format": "relgym-model", "version": 1, "body": {}, "sha256": "0"}', "checksum"),
         ("import os", "can't be read"),
         ("\x00\xff", "can't be read"),

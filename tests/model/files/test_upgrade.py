@@ -25,7 +25,7 @@ from relgym.scene.objects import Transition
 FOLDER = Path(__file__).parent
 FILES = {
     path.stem: path
-    for folder in ("v1", "v2", "v3", "v4")
+    for folder in ("v1", "v2", "v3", "v4", "v5")
     for path in sorted((FOLDER / folder).glob("*.relgym"))
 }
 
@@ -75,6 +75,11 @@ def test_retired_settings_are_left_out() -> None:
     assert body == kept  # what was read isn't changed
     assert "votes" not in found["config"]["classification"]
     assert "review" not in found["config"]["clustering"]
+    assert body["config"]["work_per_step"] == 400_000
+    assert "work_per_step" not in found["config"]
+    assert raw("truck-budgeted")["config"].keys() - upgraded(raw("truck-budgeted"), 5)["config"].keys() == {
+        "work_per_step"
+    }
     assert ModelConfig.from_json(found["config"]).classification.beam == 4
     assert upgraded(body, VERSION) == body  # the present version is taken as it is
 

