@@ -227,18 +227,14 @@ def _learn_object(
     layout = percept.layout
     name = layout.names[index]
     type_name = layout.types[index].name
-    weights: dict[str, int] = {}
-    for target, model in parts.by_type[type_name]:
-        one = confirmed.get((name, target.property))
-        if one is None or one.weight:
-            weights[target.property] = 1 if one is None else one.weight
-            continue
-        if not model.take_for_known(one.mode):
-            weights[target.property] = 1
+    weights = _weights(parts, type_name, name, confirmed)
+    followed = {
+        t.property for t, m in parts.by_type[type_name] if t.property not in weights and m.asks_latest
+    }
     # Not `asks_regressions`: what is learned doesn't depend on whether somebody looks back. What is left out here it
     # learns from all the same: it takes little, and to sums every row counts.
     rough = any([model.rough for _, model in parts.by_type[type_name]])
-    if not (weights or rough):
+    if not (weights or rough or followed):
         return False
     situation = percept.situation(index)
     x = percept.rows(index, following[None])[0]
@@ -257,12 +253,28 @@ def _learn_object(
                 table, row, y, situation.signature, example, budget, weights[target.property]
             )
             reports[name, target.property] = report
+        elif target.property in followed:
+            model.follow_latest(situation.signature, x, y)
     if rough:
         regression = parts.regressions[type_name]
         if regression.learn_one(situation.signature, x, changes):
             _tell_regressed(parts, type_name)
         budget.spend(regression.worked)
     return True
+
+
+def _weights(
+    parts: Parts, type_name: str, name: str, confirmed: Mapping[tuple[str, str], Confirmed]
+) -> dict[str, int]:
+    """For how many examples that of each property of an object stands that is to be learned from."""
+    found: dict[str, int] = {}
+    for target, model in parts.by_type[type_name]:
+        one = confirmed.get((name, target.property))
+        if one is None or one.weight:
+            found[target.property] = 1 if one is None else one.weight
+        elif not model.take_for_known(one.mode):
+            found[target.property] = 1
+    return found
 
 
 def _tell_regressed(parts: Parts, type_name: str) -> None:

@@ -30,6 +30,10 @@ hits of who is fitted. Where somebody had no value yet, all cells together tell 
 once if others were right in what they said of changes, laws explain what is seen, and it is told from all others
 without an error and scatters by less than what comes out right may be off; else it is to prove itself first.
 
+Of what comes out as such predictions do most isn't learned from (`Calibration.confirm`, `Calibration.thin`). How it
+came out is counted all the same; of what is only roughly right when the next one is learned from, so that predictions
+stay as they are in between.
+
 Only its own faults count. What a mode makes of another property's next value that was predicted wrongly says nothing of
 the mode; so its record is of steps in which what it reads was right, and it is right as probably as both are. And where
 it is learned again when a mode holds, and then without an error in a world that laws explain, what it got wrong before
@@ -76,6 +80,7 @@ __all__ = [
     "Audit",
     "Calibration",
     "Key",
+    "Rough",
     "far_bin",
     "far_bins",
     "key_of",
@@ -100,8 +105,8 @@ _VALUES: Final = (GUESS, REGRESSION, PERSISTENCE)
 _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 """Who speaks before anything is known, the first of them who has a value."""
 
-_EXACT: Final = OCTAVE * (sys.float_info.min_exp - sys.float_info.mant_dig) - 1
-"""The bin of errors no larger than rounding: below that of any number."""
+_EXACT: Final = 2 * OCTAVE * (sys.float_info.min_exp - sys.float_info.mant_dig)
+"""The bin of errors no larger than rounding, of a size that is 0 as a float64."""
 
 _DEFAULT: Final = ModelConfig()
 
@@ -126,10 +131,19 @@ class Audit(msgspec.Struct, frozen=True, gc=False):
     speaker: int = 0
 
 
-class _Waiting(NamedTuple):
-    """How a prediction came out that was left out: its cell, who spoke, and what each expert was off by (`missed`).
+class Rough(NamedTuple):
+    """How a prediction came out that is only roughly right.
 
-    NaN of who had no value. Not argued: others had no say in it, and of them, but for persistence, it isn't known.
+    Attributes
+    ----------
+    key
+        Its kind.
+    speaker
+        Who spoke.
+    argued
+        Whether others had a say; if not, only what the speaker and persistence were off by is known.
+    errors
+        What each expert was off by (`missed`), NaN of who had no value.
     """
 
     key: Key
@@ -393,7 +407,7 @@ class _Cell:
             return  # nobody is better than who was never off
         self._choose([k for k, error in enumerate(errors) if error == error])
 
-    def catch_up(self, waiting: Sequence[_Waiting], within: float) -> None:
+    def catch_up(self, waiting: Sequence[Rough], within: float) -> None:
         """Take in how predictions came out that were left out; hits are off by no more than so much."""
         self._sure = None
         for _, speaker, _, errors in waiting:
@@ -550,7 +564,7 @@ class Calibration:
         self._cells: dict[Key, _Cell] = {}
         self._changes: dict[int, float] = {}  # changes by bin of their size
         # Predictions that were left out, until the next one is learned from.
-        self._waiting: list[_Waiting] = []
+        self._waiting: list[Rough] = []
         self._slips = [0.0, 0.0]  # predictions, and those that were claimed and off
         self._claimed: dict[tuple[Key, Assessment], bool] = {}
         self._least: dict[int, float] = {}  # probability that claims need, by who makes them
@@ -999,17 +1013,7 @@ class Calibration:
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(
-        self,
-        key: Key,
-        speaker: int,
-        errors: tuple[float, ...],
-        draw: float,
-        *,
-        held: bool,
-        argued: bool = True,
-        misled: bool = False,
-    ) -> int:
+    def thin(self, rough: Rough, draw: float, *, held: bool, misled: bool = False) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
         The more of a winner there are, the less one more tells: `FIRST` of them tell what it leaves to 9 %.
@@ -1021,19 +1025,17 @@ class Calibration:
 
         Parameters
         ----------
-        key, speaker, errors
-            Its kind, who spoke, and what each expert was off by (`missed`), NaN of who had no value.
+        rough
+            How it came out.
         draw
             As of `confirm`.
         held
             Whether what came lay in its interval.
-        argued
-            Whether others had a say; if not, only what the speaker and persistence were off by is known.
         misled
             As of `look_back`.
         """
-        kind = self._cells.get(key)
-        cell = self._cells.get(_winner(key)) if key.winner else kind
+        kind = self._cells.get(rough.key)
+        cell = self._cells.get(_winner(rough.key)) if rough.key.winner else kind
         if cell is None or kind is None:
             return 1
         cell.steady += 1
@@ -1047,7 +1049,7 @@ class Calibration:
             self.trials += 1
             kind.thinned += 1
             if not misled:
-                self._waiting.append(_Waiting(key, speaker, argued, errors))
+                self._waiting.append(rough)
             return 0
         weight, kind.thinned = kind.thinned + 1, 0
         return weight
@@ -1055,7 +1057,7 @@ class Calibration:
     def _catch_up(self, error: float) -> None:
         """Count how predictions came out that were left out; `error` as of `look_back`."""
         waiting, self._waiting = self._waiting, []
-        of: dict[Key, list[_Waiting]] = {}
+        of: dict[Key, list[Rough]] = {}
         for each in waiting:
             self._changes = _counted(self._changes, _place(each.errors[PERSISTENCE]))
             for key in _levels(each.key)[1:] if each.key.winner else (each.key,):
@@ -1259,7 +1261,7 @@ class Calibration:
         found._proven = int(data.get("proven", 0))
         found._changes = _bins(data["changes"])
         found._waiting = [
-            _Waiting(
+            Rough(
                 Key(*map(int, key)),
                 int(who),
                 bool(argued),
@@ -1306,7 +1308,7 @@ def _weigh(sums: list[float], trials: int, own: float, base: float) -> None:
     sums[2] = kept * sums[2] + (1.0 + more) * base
 
 
-def _plain(waiting: _Waiting) -> list[Any]:
+def _plain(waiting: Rough) -> list[Any]:
     """One that waits, as plain data."""
     errors = [None if error != error else error for error in waiting.errors]
     return [list(waiting.key), waiting.speaker, waiting.argued, errors]

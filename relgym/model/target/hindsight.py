@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.predicting.calibration import OWN, PERSISTENCE, Audit, Calibration, missed
+from relgym.model.predicting.calibration import OWN, PERSISTENCE, Audit, Calibration, Rough, missed
 from relgym.model.predicting.prediction import LateAudit, Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
@@ -251,7 +251,7 @@ class _Look:
         are is counted of all.
         """
         record, model = part.record, answer.model
-        if not self._share or record is None or model.asks_latest:  # which mode held is to be known
+        if not self._share or record is None:
             return False
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
@@ -263,13 +263,11 @@ class _Look:
         else:  # to ask the others would take longer than predicting
             values = [math.nan] * model.calibration.experts
             values[OWN], values[PERSISTENCE] = part.value, record.present
+        errors = tuple([missed(value, came, rounding, answer.turn) for value in values])
         weight = self._stands = model.calibration.thin(
-            record.key,
-            record.speaker,
-            tuple([missed(value, came, rounding, answer.turn) for value in values]),
+            Rough(record.key, record.speaker, argued, errors),
             self._draw,
             held=abs(residual) <= part.interval,
-            argued=argued,
             misled=self._deceived(answer, record),
         )
         if abs(residual) <= STDS * part.interval:

@@ -269,6 +269,14 @@ class PropertyModel:
             self.latest = mode
         return True
 
+    def follow_latest(self, signature: SlotSignature, x: NDArray[np.float64], y: float) -> None:
+        """Take note of which mode explains an example that isn't learned from, since others stand for it."""
+        ids = self.classifier.modes
+        errors = np.abs(np.array(self.functions.values_one(signature, x.tolist(), ids)) - y)
+        fits = errors <= self.clusterer.scale.tolerance
+        if fits.any() and not (self.latest in ids and fits[ids.index(self.latest)]):
+            self.latest = ids[int(np.nanargmin(errors))]
+
     def _compare(self, signature: SlotSignature, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes predict an example before it is learned from."""
         binding = self.fallback.guessing(signature)

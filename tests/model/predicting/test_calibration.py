@@ -28,6 +28,7 @@ from relgym.model.predicting.calibration import (
     Audit,
     Calibration,
     Key,
+    Rough,
     _Cell,
     _counted,
     _place,
@@ -1512,7 +1513,7 @@ def test_of_two_models_together_all_is_learned_from_at_first() -> None:
 def thinned(known: Calibration, draw: float, *, held: bool = True, key: Key = KEY) -> int:
     """How many a prediction that is only roughly right stands for; learned from if any."""
     audit = Audit(key, values(own=1.3), OWN)
-    if weight := known.thin(key, OWN, values(own=0.3, now=1.0), draw, held=held):
+    if weight := known.thin(Rough(key, OWN, True, values(own=0.3, now=1.0)), draw, held=held):
         known.look_back(audit, 1.0, claimed=False, rounding=1e-9, error=0.05, stands=weight)
     return weight
 
@@ -1539,7 +1540,7 @@ def left_out(known: Calibration, audit: Audit, came: float, *, misled: bool = Fa
     for key in {audit.key, audit.key._replace(lead=OF_WINNER)} & known._cells.keys():
         known._cells[key].steady = FEW * FIRST
     errors = tuple(missed(value, came, 1e-9) for value in audit.values)
-    assert known.thin(audit.key, audit.speaker, errors, 1.0, held=True, misled=misled) == 0
+    assert known.thin(Rough(audit.key, audit.speaker, True, errors), 1.0, held=True, misled=misled) == 0
 
 
 @pytest.mark.parametrize(
@@ -1574,7 +1575,7 @@ def test_who_had_no_say_is_heard_of_no_more_than_he_was_asked() -> None:
     known, audit = right(200), Audit(KEY, values(own=1.0), OWN)
     before = [list(sums) for sums in known._cells[KEY].squares]
     known._cells[KEY].steady = known._cells[KEY._replace(lead=OF_WINNER)].steady = FEW * FIRST
-    assert known.thin(KEY, OWN, values(own=0.0, now=1.0), 1.0, held=True, argued=False) == 0
+    assert known.thin(Rough(KEY, OWN, False, values(own=0.0, now=1.0)), 1.0, held=True) == 0
     known._catch_up(0.05)
     assert known._cells[KEY].records[OWN].trials == 201.0
     assert known._cells[KEY].squares == before
@@ -1634,7 +1635,7 @@ def test_what_is_left_out_tells_how_right_such_values_are(saved: bool) -> None:
     for k in range(6_000):
         came = 0.99 if k % 3 == 0 else 0.6
         errors = tuple(missed(value, came, 1e-9) for value in audit.values)
-        weight = known.thin(audit.key, REGRESSION, errors, next(drawn), held=True)
+        weight = known.thin(Rough(audit.key, REGRESSION, True, errors), next(drawn), held=True)
         learned.append(weight > 0)
         if weight:
             known.look_back(audit, came, claimed=False, rounding=1e-9, error=0.05, stands=weight)
@@ -1711,7 +1712,7 @@ def test_what_a_rough_prediction_stands_for_counts_where_claims_are_rationed_and
     audit = Audit(KEY, values(own=1.3), OWN)
     for known, stands in ((one, 0), (many, 5)):
         for _ in range(3):
-            known.thin(KEY, OWN, values(own=0.3, now=1.0), 0.0, held=True)
+            known.thin(Rough(KEY, OWN, True, values(own=0.3, now=1.0)), 0.0, held=True)
         known.look_back(audit, 1.0, claimed=True, rounding=1e-9, error=0.05, stands=stands)
     cells = one._cells[KEY], many._cells[KEY]
     assert cells[0].records == cells[1].records and cells[0].squares == cells[1].squares

@@ -254,3 +254,22 @@ def test_of_approximations_that_which_held_last_is_not_asked(monkeypatch: pytest
     assert part.asks_latest
     monkeypatch.setattr(part.clusterer.population, "approximate", True)
     assert part.fallback.inexact and not part.asks_latest
+
+
+def test_which_mode_held_last_is_known_though_most_steps_are_not_learned_from() -> None:
+    """What stays 0 or 1 for a while, and in between jumps as it likes: that is known roughly, and left out mostly."""
+    rng, came = np.random.default_rng(0), list[float]()
+    while len(came) < 1_000:
+        calm, length = rng.choice(3, p=[0.2, 0.2, 0.6]), int(rng.integers(5, 25))
+        came += rng.normal(size=length).tolist() if calm == 2 else [float(calm)] * length
+    steps = transitions(
+        SCHEMA, lambda s, u: [s[0], came.pop()], rng.normal(size=(1_000, 2)), rng.normal(size=(1_000, 1))
+    )
+    model, left_out = WorldModel(SCHEMA), 0
+    for step in steps:
+        out = compare_and_learn(model, step, model.predict_one(step.before))
+        part, v = model.property_model("self", "v"), step.after["self"]["v"]
+        if part.asks_latest and v in (0.0, 1.0) and ("self", "v") not in out.learned.parts:
+            left_out += 1
+            assert formulas(model, "v")[[m.id for m in part.modes].index(part.latest)] == f"v' = {v:g}"
+    assert left_out > 50
