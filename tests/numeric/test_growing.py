@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relgym.config.constants import FIRST_ROOM
+from relgym.config.constants import FIRST_ROOM, MORE_ROOM
 from relgym.numeric.growing import grown, thin
 
 
@@ -14,7 +14,7 @@ from relgym.numeric.growing import grown, thin
     [
         (0, None, FIRST_ROOM),
         (FIRST_ROOM, None, 2 * FIRST_ROOM),
-        (16 * FIRST_ROOM, None, 18 * FIRST_ROOM),
+        (16 * FIRST_ROOM, None, int(16 * FIRST_ROOM * (1.0 + MORE_ROOM))),
         (FIRST_ROOM, FIRST_ROOM + 3, FIRST_ROOM + 3),
         (FIRST_ROOM, FIRST_ROOM, FIRST_ROOM),
     ],

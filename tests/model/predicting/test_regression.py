@@ -120,7 +120,7 @@ def test_what_each_would_have_left_of_what_came_by_hand() -> None:
 
 def test_what_the_linear_one_leaves_is_told_by_leaving_rows_out() -> None:
     """Of all rows that the weights come from, by the time that there are to be new weights."""
-    found, rng, n = Regression(3), np.random.default_rng(3), FIRST + 7
+    found, rng, n = Regression(3), np.random.default_rng(3), FIRST + 5
     rows = rng.normal(size=(n, len(SIGNATURE.columns)))
     moved = np.array([rows[:, SIGNATURE.column(0, "x")] ** 2, rows[:, SIGNATURE.column(1, "a")] ** 3]).T
     for row, (x, y) in zip(rows, moved.tolist(), strict=True):
@@ -170,7 +170,7 @@ def test_a_target_that_comes_late_is_known_of_all_rows_that_are_left_out(
 
 def test_settled_predictions_are_others_than_before() -> None:
     """Though no weight is another one: how far they count is known better."""
-    found = taught(FIRST + 8)  # solved with the latest row
+    found = taught(FIRST + 6)  # solved with the latest row
     before, reach, solved = found.revision, found.reach, found.solved
     found.settle()
     assert all(a is b for a, b in zip(solved[0], found.solved[0], strict=True))
