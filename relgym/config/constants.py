@@ -159,9 +159,10 @@ others, or to 1, is relatively smaller is collinear with them."""
 SAME_DIGITS: Final = round(-math.log10(ROUNDED))
 """Digits to which numbers agree that differ by rounding: those of `ROUNDED`."""
 
-ALIKE: Final = ROUNDED * 2.0**EVIDENCE
+ALIKE: Final = 2.0 ** (-2.0 * EVIDENCE)
 """What differs by so small a share, or by so many bits, is the same though it was found in another way, fitted to other
-examples or summed up from squares of what differs by rounding: as far as a sum of a thousand numbers does."""
+examples or summed up from squares of what differs by rounding: a millionth. By chance two numbers are as close once in
+2^20 times: `EVIDENCE`, though they were the closest of as many pairs as evidence misleads in once."""
 
 ROUNDINGS: Final = 32.0
 """Roundings that a function of a few terms on differences of stored numbers carries at most: each of some eight terms

@@ -349,12 +349,18 @@ def test_the_seed_decides_the_draws_and_nothing_else(room_steps: list[RawStep]) 
     assert found == [ROOM_MODES["vx"]] * 3
 
 
-def test_work_is_spent_within_its_budget(room_steps: list[RawStep]) -> None:
-    schema = schema_of(room_steps, ROOM_TARGETS)
-    hasty = ModelConfig(cells_per_step=1, saved_cells=0, frames="world")
-    model = WorldModel(schema, hasty)
-    spent = [model.learn_one(each).work for each in transitions(schema, room_steps[:150])]
-    assert not any(spent)  # a search has overdrawn it, which the steps that follow pay for
+def test_clauses_are_learned_within_the_budget(room_steps: list[RawStep]) -> None:
+    """Where a search has overdrawn what steps earn, clauses wait until that is paid for."""
+    schema, earned = schema_of(room_steps, ROOM_TARGETS), 100_000
+    model = WorldModel(schema, ModelConfig(cells_per_step=earned, saved_cells=0, frames="world"))
+    spent, waited = [], 0
+    for each in transitions(schema, room_steps[:150]):
+        poor = model._parts.agenda.saved + earned <= 0
+        waiting = any(m.classifier.waits for m in model._parts.models.values())
+        spent.append(model.learn_one(each).work)
+        assert not (poor and spent[-1])
+        waited += poor and waiting
+    assert any(spent) and waited
     assert model.finish() > 0
     assert model.finish() == 0
     assert wrong(model, room(1, 100)) == 0

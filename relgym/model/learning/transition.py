@@ -229,7 +229,7 @@ def _learn_object(
     type_name = layout.types[index].name
     weights = _weights(parts, type_name, name, confirmed)
     followed = {
-        t.property for t, m in parts.by_type[type_name] if t.property not in weights and m.asks_latest
+        t.property for t, m in parts.by_type[type_name] if t.property not in weights and m.follows_latest
     }
     # Not `asks_regressions`: what is learned doesn't depend on whether somebody looks back. What is left out here it
     # learns from all the same: it takes little, and to sums every row counts.

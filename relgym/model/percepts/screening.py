@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from relgym.config.constants import ENOUGH, FIRST, LAYOUTS, OUTLYING, REPEATED, ROUNDED, SUMMABLE
+from relgym.config.constants import ALIKE, ENOUGH, FIRST, LAYOUTS, OUTLYING, REPEATED, SUMMABLE
 from relgym.scene.objects import SceneLayout
 
 __all__ = ["Screen"]
@@ -158,11 +158,11 @@ class Screen:
             known = self._largest[:, 0]
             some = known[known > 0.0]
             if not len(some):
-                return np.full(len(known), 1.0 / ROUNDED)
+                return np.full(len(known), 1.0 / ALIKE)
             most = float(some.max())
             limits = OUTLYING * np.where(known > 0.0, np.maximum(known, np.median(some)), most)
             # Of the first scenes only that is suspicious beside which all that is known, and 1, are next to nothing.
-            limits[self._scenes < ENOUGH] = max(most, 1.0) / ROUNDED
+            limits[self._scenes < ENOUGH] = max(most, 1.0) / ALIKE
             self._limits = np.minimum(limits, MOST)
         return self._limits
 

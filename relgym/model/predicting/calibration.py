@@ -271,9 +271,12 @@ class _Record:
                 self.trials, self.hits = 0.5 * self.trials, 0.5 * self.hits
             return False
         if hit != (self.run > 0):
-            if self.run:
+            own = min(
+                abs(self.run), self.trials
+            )  # others were of a record before that (`Calibration.revise`)
+            if own:
                 was = self.run > 0
-                self.runs[was] += abs(self.run)
+                self.runs[was] += own
                 self.runs[2 + was] += 1.0
             self.run = 0
         self.run += times if hit else -times
@@ -1157,11 +1160,11 @@ class Calibration:
     def failing(self, key: Key) -> bool:
         """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended.
 
-        Misses in a row count though what tells when the mode holds was learned again in between.
+        Misses in a row count though what tells when the mode holds was learned again in between, if it was wrong again.
         """
         cell = self._cells.get(_winner(key))
         own = None if cell is None else cell.records.get(OWN)
-        if own is None:
+        if own is None or own.hits >= own.trials:
             return False
         counts = (own.hits, max(own.trials - own.hits, -own.run))
         trials = sum(counts)
@@ -1386,7 +1389,11 @@ def _place(error: float) -> int:
 
 def _bins(data: Iterable[tuple[int, float]]) -> dict[int, float]:
     """Bins as files have them; in those of before that of exact hits lies farther below."""
-    return {max(int(place), _EXACT): float(count) for place, count in data}
+    found: dict[int, float] = {}
+    for place, count in data:
+        at = max(int(place), _EXACT)
+        found[at] = found.get(at, 0.0) + float(count)
+    return found
 
 
 def _counted(bins: dict[int, float], place: int, times: int = 1) -> dict[int, float]:

@@ -175,7 +175,8 @@ def _better(
     config, seed
         As in the configuration.
     """
-    lengths = sorted({min(2, config.max_terms), config.max_terms})
+    short = min(2, config.max_terms)
+    lengths = sorted({short, max(short, config.max_terms // 2)})
     for scale, terms in itertools.product(scales, lengths):
         rng = np.random.default_rng([seed, len(y)])
         found = yield from consensus.steps(

@@ -270,12 +270,20 @@ class PropertyModel:
         return True
 
     def follow_latest(self, signature: SlotSignature, x: NDArray[np.float64], y: float) -> None:
-        """Take note of which mode explains an example that isn't learned from, since others stand for it."""
-        ids = self.classifier.modes
+        """Take note of which mode explains an example that isn't learned from, since others stand for it.
+
+        Of modes whose roles bodies play only learning tells that (`cast`).
+        """
+        ids = tuple(self.clusterer.clusters)
         errors = np.abs(np.array(self.functions.values_one(signature, x.tolist(), ids)) - y)
         fits = errors <= self.clusterer.scale.tolerance
         if fits.any() and not (self.latest in ids and fits[ids.index(self.latest)]):
             self.latest = ids[int(np.nanargmin(errors))]
+
+    @property
+    def cast(self) -> bool:
+        """Whether bodies play roles in a mode."""
+        return any([self.casting.embodied(mode) for mode in self.modes])
 
     def _compare(self, signature: SlotSignature, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes predict an example before it is learned from."""
@@ -609,11 +617,16 @@ class PropertyModel:
 
         Nor where modes are approximations: of these it is the place that decides, and no law goes on until it changes.
         """
-        if len(self.classifier.modes) < 2 or self.latest not in self.clusterer.clusters:
+        if self.latest not in self.clusterer.clusters or self.bounds(self.latest):
             return False
-        if self.fallback.inexact:
+        return self.follows_latest
+
+    @property
+    def follows_latest(self) -> bool:
+        """Whether which mode held is to be known of every example, since the one that held last may be asked."""
+        if len(self.classifier.modes) < 2 or self.fallback.inexact:
             return False
-        return not self.bounds(self.latest) and (self.rough or self.record.doubts(_PREDICTED))
+        return self.rough or self.record.doubts(_PREDICTED)
 
     def latest_values(
         self, percept: Percept, index: int, following: NDArray[np.float64]

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relgym.config.constants import ENOUGH, OUTLYING, REPEATED, ROUNDED
+from relgym.config.constants import ALIKE, ENOUGH, OUTLYING, REPEATED
 from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.percepts.screening import MOST, Screen
 from relgym.model.world_model import WorldModel
@@ -115,18 +115,18 @@ def limits(screen: Screen) -> list[float]:
 
 def test_limits_by_hand() -> None:
     # The fifth largest of each property counts, where a scene that stays is seen before and after its step.
-    assert limits(Screen()) == [1.0 / ROUNDED] * 2
+    assert limits(Screen()) == [1.0 / ALIKE] * 2
     assert (
-        limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [2.0 / ROUNDED] * 2
+        limits(seen((2.0, 0.5), (3.0, 0.0), (4.0, 0.25))) == [2.0 / ALIKE] * 2
     )  # 2 2 3 3 4 4: the fifth is 2
     screen = seen(*[(4.0, 0.5)] * ENOUGH)
     # The median of 4 and 0.5 is 2.25, and v is allowed as much as a property usually is.
     assert limits(screen) == [OUTLYING * 4.0, OUTLYING * 2.25]
     still = seen(*[(4.0, 0.0)] * ENOUGH)
     assert limits(still) == [OUTLYING * 4.0] * 2  # never moved: the largest of all others stands in
-    assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [1.0 / ROUNDED] * 2
+    assert limits(seen(*[(0.0, 0.0)] * ENOUGH)) == [1.0 / ALIKE] * 2
     assert (
-        limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [1.0 / ROUNDED] * 2
+        limits(seen(*[(1e-3, 1e-4)] * (ENOUGH - 1))) == [1.0 / ALIKE] * 2
     )  # of the first scenes 1 is the least
 
 

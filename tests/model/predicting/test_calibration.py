@@ -1444,14 +1444,29 @@ def test_who_fails_after_each_revision_is_believed_later_each_time() -> None:
 def test_misses_in_a_row_show_that_who_wins_fails_though_clauses_were_learned_again_in_between() -> None:
     known = right(100)
     for misses in range(1, 15):
-        seen(known, values(own=1.0), 2.0)
         if misses % 4 == 0:
             known.revise({1})
+            assert not known.failing(KEY)  # that it wins wrongly still is to be seen
+        seen(known, values(own=1.0), 2.0)
         assert known.failing(KEY) == (misses >= 10)
     again = Calibration.from_json(json.loads(json.dumps(known.to_json())), 0.9)
     assert again.failing(KEY)
     seen(known, values(own=1.0), 1.0)
     assert not known.failing(KEY)
+
+
+@pytest.mark.parametrize("misses", [5, 20, 60])
+def test_misses_before_a_revision_do_not_hide_those_that_come_later(misses: int) -> None:
+    """That misses came in a long run is no part of the record that begins anew."""
+    known = right(100)
+    for _ in range(misses):
+        seen(known, values(own=1.0), 2.0)
+    known.revise({1})
+    for _ in range(200):
+        seen(known, values(own=1.0), 1.0)
+    for later in range(1, 15):
+        seen(known, values(own=1.0), 2.0)
+        assert known.failing(KEY) == (later >= 10)
 
 
 def test_a_revision_says_nothing_of_what_was_always_right() -> None:
