@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from relgym.arguments import refusing
 from relgym.config.checks import checked_count
-from relgym.config.constants import MOST_STEPS
+from relgym.config.constants import MEMORY, MOST_STEPS
 from relgym.errors import ConfigError, ObservationError
 from relgym.html import html_table
 from relgym.model.learning.transition import LearnReport
@@ -120,7 +120,7 @@ class Prequential:
     Parameters
     ----------
     window
-        How many steps count as the latest, >= 1.
+        How many steps count as the latest, >= 1; by default as many as tell how right predictions are.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Prequential:
     """
 
     @refusing(ConfigError)
-    def __init__(self, window: int) -> None:
+    def __init__(self, window: int = MEMORY) -> None:
         self.steps = 0
         self.predictions: dict[Key, int] = {}
         self.wrong: dict[Key, int] = {}

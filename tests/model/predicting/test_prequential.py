@@ -135,7 +135,7 @@ def test_rightly_stated_spreads_are_calibrated() -> None:
 
 
 def test_only_the_latest_steps_count_and_before_any_nothing_is_known() -> None:
-    none = Prequential(window=10)
+    none = Prequential()
     assert math.isnan(none.nrmse) and math.isnan(none.coverage) and math.isnan(none.calibration)
     bad, good = outcomes((A, 1.0, 1.0, False, math.nan)), outcomes((A, 0.0, 1.0, True, 0.0))
     count = counted(bad, good, good, window=2)
