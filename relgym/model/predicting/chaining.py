@@ -175,8 +175,7 @@ def _better(
     config, seed
         As in the configuration.
     """
-    short = min(2, config.max_terms)
-    lengths = sorted({short, max(short, config.max_terms // 2)})
+    lengths = sorted({min(2, config.max_terms), config.max_terms})
     for scale, terms in itertools.product(scales, lengths):
         rng = np.random.default_rng([seed, len(y)])
         found = yield from consensus.steps(
