@@ -49,7 +49,7 @@ class OnlineRidge:
 
     Notes
     -----
-    Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every eighth more, in pieces of `SEARCHED_CELLS`
+    Cost O(d^2 + d * responses) a row; O(d^3 + d^2 * responses) at every tenth more, in pieces of `SEARCHED_CELLS`
     cells a row.
 
     References

@@ -28,9 +28,7 @@ def due(seen: int, first: int, times: float = 2) -> bool:
     >>> [n for n in range(5_000) if due(n, 64, 4)]
     [64, 256, 1024, 4096]
     """
-    while first < seen:
-        first = math.ceil(times * first)
-    return seen == first
+    return came_due(seen - 1, seen, first, times)
 
 
 def came_due(before: int, seen: int, first: int, times: float = 2) -> bool:
