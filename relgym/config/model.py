@@ -34,7 +34,7 @@ class ModelConfig:
         (`relgym.model.target.scope`). Default true; false: the votes decide there as everywhere.
     cells_per_step
         What each transition earns for searches (for modes, approximations, causal order, guesses and clauses), in
-        cells: numbers looked at, of which a thousand million take one to four seconds. Default 500,000, 2 ms at most,
+        cells: numbers looked at, of which a thousand million take one to four seconds. Default 250,000, 1 ms at most,
         range 1 to 10**15. A search that takes more than there is goes on after the next
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
@@ -43,7 +43,7 @@ class ModelConfig:
         some 20 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
-        1,000,000,000, 4 s at most: worlds that can be understood are, before it is spent.
+        400,000,000, 1.6 s at most: worlds that can be understood mostly are before half of it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -96,9 +96,9 @@ class ModelConfig:
     seed: int = 0
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
-    cells_per_step: int = 500_000
+    cells_per_step: int = 250_000
     most_cells: int = 5_000_000
-    saved_cells: int = 1_000_000_000
+    saved_cells: int = 400_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()

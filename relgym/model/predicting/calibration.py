@@ -516,6 +516,14 @@ class _Cell:
         known = self.records.get(speaker) if _makes_claims(speaker) else None
         return known is not None and known.trials >= FEW and known.mean(0.5) < NEARLY_ALL
 
+    def _idle(self, own: _Record) -> bool:
+        """Whether the winner is right less often than that nothing changes, and leaves more: it explains nothing.
+
+        So it is of a law found among rows that hardly ever change, which is right as long as all of them are 0.
+        """
+        none = self.records.get(PERSISTENCE)
+        return none is not None and self.left(OWN) > self.left(PERSISTENCE) and own.even() < none.even()
+
     def undecided(self, expert: int, other: int) -> bool:
         """Whether an expert doesn't lead another one by enough; one that was never heard, if not even persistence."""
         return self.lead(expert, other if self.squares[other][0] else PERSISTENCE) < EVIDENCE
@@ -529,7 +537,7 @@ class _Cell:
         own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
         probability, slips = claims
         least = max(probability, min(other.even(), 1.0 - slips))
-        if OWN in able and own is not None and own.even() >= least:
+        if OWN in able and own is not None and own.even() >= least and not self._idle(own):
             least = min(self.left(expert) for expert in able if expert in _KNOWN or expert >= len(EXPERTS))
             if self.left(OWN) * NEARLY_ALL * NEARLY_ALL <= least:  # squares: in root mean square a tenth more
                 return OWN
@@ -1023,7 +1031,8 @@ class Calibration:
         So of n, one of n / `FIRST` is learned from, of each twice as many as many again, until one of `FEW` is: then
         learning takes little beside predicting. Kinds of few trials are learned from in any case. Where intervals hold
         less often than they are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from
-        (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside). How often who
+        (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside), but for what a
+        regression says: that learns from all anyway. How often who
         speaks is right, and how far off everybody is, is counted of all, in the cells of their kind and winner.
 
         Parameters
@@ -1042,9 +1051,12 @@ class Calibration:
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        beyond = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
-        likelihood = (1.0 - beyond) / COVERED if held else beyond / (1.0 - COVERED)
-        cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
+        if rough.speaker == REGRESSION:  # which learns from all: there is nothing that more of them would mend
+            cell.doubt = 0.0
+        else:
+            beyond = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
+            likelihood = (1.0 - beyond) / COVERED if held else beyond / (1.0 - COVERED)
+            cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
         if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
             cell.steady = 0
         left_out = draw * min(cell.steady // FIRST, FEW) > 1.0

@@ -51,7 +51,7 @@ class Standing(Enum):
     COARSE
         Little: it is known only roughly what comes, and nothing tells more.
     OPEN
-        As much as any.
+        As much as any: something is being looked for, or nothing tells yet which mode holds.
     """
 
     SETTLED = 0
@@ -251,7 +251,7 @@ class _Look:
         are is counted of all.
         """
         record, model = part.record, answer.model
-        if not self._share or record is None or (model.cast and model.follows_latest):
+        if not self._share or record is None or (model.follows_latest and model.cast):
             return False
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1

@@ -248,12 +248,10 @@ class PropertyModel:
     @property
     def standing(self) -> Standing:
         """How much a prediction teaches that came out as such ones do."""
-        if self.undecided:
-            return Standing.OPEN
         c = self.clusterer
         if c.approximate or self.rough:
             return Standing.COARSE
-        if c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
+        if self.undecided or c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
             return Standing.OPEN
         return Standing.SETTLED
 
@@ -283,7 +281,7 @@ class PropertyModel:
     @property
     def cast(self) -> bool:
         """Whether bodies play roles in a mode."""
-        return any([self.casting.embodied(mode) for mode in self.modes])
+        return any([self.casting.embodied(cluster.mode) for cluster in self.clusterer.clusters.values()])
 
     def _compare(self, signature: SlotSignature, example: Example, x: NDArray[np.float64], y: float) -> None:
         """Let the guess and the modes predict an example before it is learned from."""

@@ -880,6 +880,26 @@ def test_a_law_keeps_the_word_by_hand() -> None:
     assert prefers(0.5, 0.02, able=(OWN, PERSISTENCE)) == OWN  # who speaks has none: the next best
 
 
+def test_a_law_that_is_right_only_where_nothing_changes_explains_nothing() -> None:
+    """Of a number that is 0 but for a few steps a law is nearly always right whose terms are 0, too."""
+
+    def speaks(hits: float, squares: float) -> int:
+        found = _Cell.new(REGRESSION, len(EXPERTS))
+        found.records = {
+            OWN: _Record(200.0, hits),
+            PERSISTENCE: _Record(200.0, 195.0),
+            REGRESSION: _Record(200.0, 150.0),
+        }
+        found.squares[OWN], found.squares[PERSISTENCE] = [200.0, squares, 4.0], [200.0, 4.0, 4.0]
+        found.squares[REGRESSION] = [200.0, 3.9, 4.0]
+        return found.preferred((OWN, REGRESSION, PERSISTENCE), (0.5, 0.0075))
+
+    assert speaks(194.0, 4.2) == REGRESSION  # in .97 of all, where that nothing changes is right in .975
+    assert speaks(194.0, 3.9) == OWN  # leaves less
+    assert speaks(195.0, 4.2) == OWN  # is right as often: a crash or two make most of the squares
+    assert speaks(194.0, 4.0) == OWN  # says that nothing changes
+
+
 def test_a_guess_takes_no_law_the_word_but_an_added_class_does() -> None:
     """What nobody would have tried first says nothing of a law that is right often enough."""
     for other, speaker in (
@@ -1704,6 +1724,15 @@ def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
     held = [thinned(known, next(drawn)) for _ in range(200)]
     assert 0 not in held[:20]
     assert held[-100:].count(0) >= 90  # of five thousand one in 78 is learned from
+
+
+def test_of_what_a_regression_says_more_would_mend_nothing() -> None:
+    known, drawn = right(FEW), draws()
+    rough = Rough(KEY, REGRESSION, True, values(regression=0.3, now=1.0))
+    for _ in range(5_000):
+        known.thin(rough, next(drawn), held=True)
+    weights = [known.thin(rough, next(drawn), held=False) for _ in range(100)]
+    assert weights.count(0) >= 90
 
 
 def test_of_another_world_all_is_learned_from_as_of_the_first() -> None:

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
-from relgym.config.constants import FIRST, NEARLY_ALL, RECENT
+from relgym.config.constants import FIRST, MEMORY, NEARLY_ALL, RECENT
 from relgym.model.predicting.calibration import OWN
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
-from relgym.model.target.hindsight import Hindsight
+from relgym.model.target.hindsight import Hindsight, Standing
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import Scene, Transition
 
@@ -182,6 +182,14 @@ def test_right_predictions_make_up_for_wrong_ones(lottery: WorldModel) -> None:
     assert not model.property_model("self", "x").unexplained
     assert model.predict_one(law.before)["self", "x"].outcome is Outcome.PREDICTED
     assert model.advice() == ()
+
+
+def test_what_stays_undecided_teaches_little_in_the_end(lottery: WorldModel) -> None:
+    """Half of what a record remembers came, and regressions are asked (`PropertyModel.rough`)."""
+    known = copy.deepcopy(lottery).property_model("self", "x")
+    for trials, standing in ((MEMORY // 2 - 1, Standing.OPEN), (MEMORY // 2, Standing.COARSE)):
+        known.calibration.trials = trials
+        assert known.undecided and known.standing is standing
 
 
 def test_with_one_mode_there_is_no_choice() -> None:
