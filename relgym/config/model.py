@@ -43,7 +43,7 @@ class ModelConfig:
         some 20 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
-        400,000,000, 1.6 s at most: worlds that can be understood mostly are before half of it is spent.
+        1,000,000,000, 4 s at most: worlds that can be understood are, before it is spent.
     frames
         Axes in which velocities are described. ``"auto"`` (default): laws of motion, stated in the frame of a contact
         or another one that the scene offers, for those types whose transitions they describe in fewer bits than modes
@@ -98,7 +98,7 @@ class ModelConfig:
     abstain: bool = True
     cells_per_step: int = 250_000
     most_cells: int = 5_000_000
-    saved_cells: int = 400_000_000
+    saved_cells: int = 1_000_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()
     hypotheses: tuple[str, ...] = ()

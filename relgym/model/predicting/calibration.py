@@ -108,6 +108,13 @@ _BY_DEFAULT: Final = (OWN, GUESS, REGRESSION, PERSISTENCE)
 _EXACT: Final = 2 * OCTAVE * (sys.float_info.min_exp - sys.float_info.mant_dig)
 """The bin of errors no larger than rounding, of a size that is 0 as a float64."""
 
+_BEYOND: Final = math.sqrt(1.0 - COVERED)
+"""Share outside of intervals that aren't what they were: half way, in logarithms, between as many as are to and all."""
+
+_HELD: Final = math.log2((1.0 - _BEYOND) / COVERED)
+_OUTSIDE: Final = math.log2(_BEYOND / (1.0 - COVERED))
+"""Bits that speak for that where an interval held, and where it didn't."""
+
 _DEFAULT: Final = ModelConfig()
 
 FAR: Final = range(NO_RUNNER_UP, NO_RUNNER_UP + NO_RUNNER_UP)[1:]
@@ -185,10 +192,13 @@ def key_of(outcome: int, winner: int, margin: float, far: int = 0) -> Key:
     return Key(outcome, winner, min(max(math.frexp(margin)[1] + 2, 1), NO_RUNNER_UP - 1))
 
 
-def missed(value: float, came: float, rounding: float, turn: float = 0.0) -> float:
-    """How far a value was off; 0 up to rounding. Of an angle, whose full turn is so long, the shorter way round."""
-    off = abs(math.remainder(value - came, turn) if turn and value == value else value - came)
-    return 0.0 if off <= rounding else min(off, SUMMABLE)
+def missed(values: Sequence[float], came: float, rounding: float, turn: float = 0.0) -> tuple[float, ...]:
+    """How far each value was off; 0 up to rounding. Of angles, whose full turn is so long, the shorter way round."""
+    found = []
+    for value in values:
+        off = abs(math.remainder(value - came, turn) if turn and value == value else value - came)
+        found.append(0.0 if off <= rounding else SUMMABLE if off > SUMMABLE else off)
+    return tuple(found)
 
 
 def far_bin(distance: float) -> int:
@@ -580,6 +590,7 @@ class Calibration:
         self._claimed: dict[tuple[Key, Assessment], bool] = {}
         self._least: dict[int, float] = {}  # probability that claims need, by who makes them
         self._kinds: dict[int, list[_Cell]] = {}  # cells of kinds of predictions, by who makes them
+        self._doubted: dict[int, bool] = {}  # see `doubts`
         self._vouched = (
             0.0  # bits by which laws, when they came in force, described what came better than modes
         )
@@ -592,7 +603,7 @@ class Calibration:
         self._listed: list[_Cell] | None = None  # see `_all_cells`
 
     def __getstate__(self) -> dict[str, Any]:
-        cached = ("_assessed", "_verdicts", "_claimed", "_least", "_kinds")
+        cached = ("_assessed", "_verdicts", "_claimed", "_least", "_kinds", "_doubted")
         return self.__dict__ | {name: {} for name in cached} | {"_united": None, "_listed": None}
 
     def _changed(self, *, cells: bool = True) -> None:
@@ -601,6 +612,7 @@ class Calibration:
         self._verdicts.clear()
         self._claimed.clear()
         self._least.clear()
+        self._doubted.clear()
         self._united = None
         if cells:
             self._kinds.clear()
@@ -950,7 +962,7 @@ class Calibration:
         """
         if self._waiting:
             self._catch_up(error)
-        errors = [missed(value, came, rounding, turn) for value in audit.values]
+        errors = missed(audit.values, came, rounding, turn)
         self.trials += not times
         self._changes = _counted(self._changes, _place(errors[PERSISTENCE]))
         within = max(rounding, error * self.change)
@@ -1054,9 +1066,7 @@ class Calibration:
         if rough.speaker == REGRESSION:  # which learns from all: there is nothing that more of them would mend
             cell.doubt = 0.0
         else:
-            beyond = math.sqrt(1.0 - COVERED)  # half way, in logarithms, between as many as are to and all
-            likelihood = (1.0 - beyond) / COVERED if held else beyond / (1.0 - COVERED)
-            cell.doubt = min(max(0.0, cell.doubt + math.log2(likelihood)), 2.0 * EVIDENCE)
+            cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
         if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
             cell.steady = 0
         left_out = draw * min(cell.steady // FIRST, FEW) > 1.0
@@ -1165,9 +1175,13 @@ class Calibration:
 
     def doubts(self, outcome: int) -> bool:
         """Whether what won votes was off more often than claims may be, or the mode that held last spoke instead."""
-        if not self.share(outcome) >= 1.0 - self.allowed:
-            return _family(Key(outcome, 1, 0)) in self._cells
-        return any(c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome)
+        if (known := self._doubted.get(outcome)) is None:
+            if self.share(outcome) >= 1.0 - self.allowed:
+                known = any([c.speaker == LATEST for k, c in self._cells.items() if k.outcome == outcome])
+            else:
+                known = _family(Key(outcome, 1, 0)) in self._cells
+            self._doubted[outcome] = known
+        return known
 
     def failing(self, key: Key) -> bool:
         """Whether who won was less often right than a fair coin, by `EVIDENCE` bits, since the record last ended.
@@ -1355,11 +1369,13 @@ def _who(key: Key) -> int:
     return (key.winner > 0) - (key.winner < 0)
 
 
+@lru_cache
 def _family(key: Key) -> Key:
     """The cell of all predictions of one outcome that laws, or modes, make."""
     return Key(key.outcome, _who(key), OF_FAMILY)
 
 
+@lru_cache
 def _winner(key: Key) -> Key:
     """The cell of all predictions of one outcome and winner."""
     return Key(key.outcome, key.winner, OF_WINNER)
@@ -1370,6 +1386,7 @@ def _beside(lead: int) -> Key:
     return Key(0, 0, lead)
 
 
+@lru_cache
 def _levels(key: Key) -> tuple[Key, Key, Key]:
     """The cells that a prediction is counted in, the widest first; where nobody won they are one."""
     return (_family(key), _winner(key), key) if key.winner else (key, key, key)

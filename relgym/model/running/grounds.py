@@ -43,8 +43,7 @@ class Grounds(NamedTuple):
             numbers += (parts.laws.governed, book.tolerance, tuple(book.free), dict(book.shares))
         asked = set()
         for target in parts.targets:
-            _read(parts.models[target], things, numbers, votes=not parts.governs(target))
-            if parts.models[target].asks_regressions:
+            if _read(parts.models[target], things, numbers, votes=not parts.governs(target)):
                 asked.add(target.type)
         for name in sorted(asked):
             weights, others = parts.regressions[name].solved
@@ -61,9 +60,9 @@ class Grounds(NamedTuple):
         )
 
 
-def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes: bool) -> None:
-    """What is read of one target."""
-    clusterer, classifier = model.clusterer, model.classifier
+def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes: bool) -> bool:
+    """What is read of one target; whether that asks regressions."""
+    clusterer, classifier, asks = model.clusterer, model.classifier, model.asks_regressions
     known = model.fallback
     things += (known.scope, model.limits, model.stops, model.spreads, model.conditions, known.guess)
     things += (known.guess_beyond, classifier.vocabulary, *classifier.classifiers)
@@ -73,12 +72,12 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
         classifier.modes,
         clusterer.approximate,
         model.surmise,
-        model.asks_regressions,
+        asks,
         model.tells_how_far,
         known.lawless,
     )
     if not votes:
-        return
+        return asks
     numbers += (model.undecided, model.lost)
     if len(classifier.modes) > 1 and not model.lost:
         familiar = classifier._familiarity()
@@ -90,3 +89,4 @@ def _read(model: PropertyModel, things: list[Any], numbers: list[Any], *, votes:
         for d in cast.descriptions:
             things.append(d.definition)
             numbers.append(None if d.common is None else d.common.tobytes())
+    return asks

@@ -263,7 +263,7 @@ class _Look:
         else:  # to ask the others would take longer than predicting
             values = [math.nan] * model.calibration.experts
             values[OWN], values[PERSISTENCE] = part.value, record.present
-        errors = tuple([missed(value, came, rounding, answer.turn) for value in values])
+        errors = missed(values, came, rounding, answer.turn)
         weight = self._stands = model.calibration.thin(
             Rough(record.key, record.speaker, argued, errors),
             self._draw,

@@ -1574,7 +1574,7 @@ def left_out(known: Calibration, audit: Audit, came: float, *, misled: bool = Fa
     """A prediction that is left out, since a great many like it came before."""
     for key in {audit.key, audit.key._replace(lead=OF_WINNER)} & known._cells.keys():
         known._cells[key].steady = FEW * FIRST
-    errors = tuple(missed(value, came, 1e-9) for value in audit.values)
+    errors = missed(audit.values, came, 1e-9)
     assert known.thin(Rough(audit.key, audit.speaker, True, errors), 1.0, held=True, misled=misled) == 0
 
 
@@ -1669,7 +1669,7 @@ def test_what_is_left_out_tells_how_right_such_values_are(saved: bool) -> None:
     audit = Audit(Key(2, 0, 0), values(regression=1.0), REGRESSION)
     for k in range(6_000):
         came = 0.99 if k % 3 == 0 else 0.6
-        errors = tuple(missed(value, came, 1e-9) for value in audit.values)
+        errors = missed(audit.values, came, 1e-9)
         weight = known.thin(Rough(audit.key, REGRESSION, True, errors), next(drawn), held=True)
         learned.append(weight > 0)
         if weight:
@@ -1683,11 +1683,12 @@ def test_what_is_left_out_tells_how_right_such_values_are(saved: bool) -> None:
 
 
 def test_how_far_off_is_told_up_to_rounding_and_the_shorter_way_round() -> None:
-    assert missed(1.0, 1.25, 0.1) == 0.25
-    assert missed(1.0, 1.25, 0.25) == 0.0
-    assert missed(3.0, -3.0, 0.1, turn=6.25) == 0.25
-    assert missed(-1e308, 1e308, 0.1) == SUMMABLE
-    assert math.isnan(missed(math.nan, 1.0, 0.1, turn=6.25))
+    assert missed((1.0, 1.5), 1.25, 0.1) == (0.25, 0.25)
+    assert missed((1.0,), 1.25, 0.25) == (0.0,)
+    assert missed((3.0,), -3.0, 0.1, turn=6.25) == (0.25,)
+    assert missed((-1e308,), 1e308, 0.1) == (SUMMABLE,)
+    (nothing,) = missed((math.nan,), 1.0, 0.1, turn=6.25)
+    assert math.isnan(nothing)
 
 
 def test_what_teaches_who_needs_less_teaches_who_needs_more() -> None:
