@@ -294,7 +294,9 @@ def test_where_a_regression_errs_more_than_before_modes_are_taught_no_more_for_i
     """It learns from all that comes, whatever modes are taught."""
     model = WorldModel(BOX, targets=[SPEED])
     learned(model, curve(4_200))
-    assert {p.record.speaker for p in model.predict_one(next(curve(1)).before).parts if p.record} == {REGRESSION}
+    assert {p.record.speaker for p in model.predict_one(next(curve(1)).before).parts if p.record} == {
+        REGRESSION
+    }
     # But for what is news, so far outside of its interval.
     assert max(shares(model, curve(400, sign=-1.0, seed=2))) < 0.2
 

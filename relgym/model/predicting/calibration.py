@@ -1063,7 +1063,9 @@ class Calibration:
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        if rough.speaker == REGRESSION:  # which learns from all: there is nothing that more of them would mend
+        if (
+            rough.speaker == REGRESSION
+        ):  # which learns from all: there is nothing that more of them would mend
             cell.doubt = 0.0
         else:
             cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)

@@ -615,9 +615,9 @@ class PropertyModel:
 
         Nor where modes are approximations: of these it is the place that decides, and no law goes on until it changes.
         """
-        if self.latest not in self.clusterer.clusters or self.bounds(self.latest):
+        if self.latest not in self.clusterer.clusters or not self.follows_latest:
             return False
-        return self.follows_latest
+        return not self.bounds(self.latest)
 
     @property
     def follows_latest(self) -> bool:

@@ -1205,6 +1205,7 @@ def test_shares_of_an_outcome_and_doubts() -> None:
     sure = right(40)
     assert not sure.doubts(0)
     sure._cells[KEY].speaker = LATEST
+    sure._changed()
     assert sure.doubts(0)
     assert not sure.doubts(1)
 
