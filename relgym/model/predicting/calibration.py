@@ -542,7 +542,8 @@ class _Cell:
         """Who of those who have a value speaks.
 
         The winner where that can be claimed, is right as often as who codes best (or as it takes for all to be
-        claimed), and leaves hardly more than what anybody would try; else who codes best.
+        claimed), and leaves hardly more than what anybody would try; else who codes best. Nor does it keep the word
+        from one who codes better where it is right less often than that nothing changes, and leaves more.
         """
         own, other = self.records.get(OWN), self.records.get(self.speaker, _Record())
         probability, slips = claims
@@ -675,7 +676,7 @@ class Calibration:
     def own_word(self, key: Key) -> Assessment | None:
         """What is made of a prediction if the winner has the word whatever others say; None where that depends."""
         told = self._known(key, self._everyone)
-        return told if told.speaker == OWN else None
+        return told if told.speaker == OWN == self._known(key, (OWN, PERSISTENCE)).speaker else None
 
     def _known(self, key: Key, able: tuple[int, ...]) -> Assessment:
         """`_assess`, worked out once between changes."""
@@ -1036,15 +1037,16 @@ class Calibration:
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(self, rough: Rough, draw: float, *, held: bool, misled: bool = False) -> int:
+    def thin(
+        self, rough: Rough, draw: float, *, held: bool, misled: bool = False, taught: bool = False
+    ) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
         The more of a winner there are, the less one more tells: `FIRST` of them tell what it leaves to 9 %.
         So of n, one of n / `FIRST` is learned from, of each twice as many as many again, until one of `FEW` is: then
         learning takes little beside predicting. Kinds of few trials are learned from in any case. Where intervals hold
         less often than they are to, by `EVIDENCE` bits, the world isn't what it was, and all is learned from
-        (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside), but for what a
-        regression says: that learns from all anyway. How often who
+        (cumulative sums: Page 1954; the alternative is that four to five times as many lie outside). How often who
         speaks is right, and how far off everybody is, is counted of all, in the cells of their kind and winner.
 
         Parameters
@@ -1057,22 +1059,20 @@ class Calibration:
             Whether what came lay in its interval.
         misled
             As of `look_back`.
+        taught
+            Whether who spoke learns from it in any case, as regressions do: then more of them would mend nothing.
         """
         kind = self._cells.get(rough.key)
         cell = self._cells.get(_winner(rough.key)) if rough.key.winner else kind
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        if (
-            rough.speaker == REGRESSION
-        ):  # which learns from all: there is nothing that more of them would mend
-            cell.doubt = 0.0
-        else:
+        if not taught:
             cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
-        if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
-            cell.steady = 0
-        left_out = draw * min(cell.steady // FIRST, FEW) > 1.0
-        if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
+            if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
+                cell.steady = 0
+        left_out = draw * min(cell.steady // FIRST, FEW) > 1.0 and (taught or cell.doubt < EVIDENCE)
+        if left_out and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
             kind.thinned += 1
             if not misled:

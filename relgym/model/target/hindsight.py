@@ -19,7 +19,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.predicting.calibration import OWN, PERSISTENCE, Audit, Calibration, Rough, missed
+from relgym.model.predicting.calibration import (
+    OWN,
+    PERSISTENCE,
+    REGRESSION,
+    Audit,
+    Calibration,
+    Rough,
+    missed,
+)
 from relgym.model.predicting.prediction import LateAudit, Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
@@ -51,7 +59,7 @@ class Standing(Enum):
     COARSE
         Little: it is known only roughly what comes, and nothing tells more.
     OPEN
-        As much as any: something is being looked for, or nothing tells yet which mode holds.
+        As much as any: something is being looked for, or nothing tells yet which of some laws holds.
     """
 
     SETTLED = 0
@@ -269,6 +277,7 @@ class _Look:
             self._draw,
             held=abs(residual) <= part.interval,
             misled=self._deceived(answer, record),
+            taught=record.speaker == REGRESSION and model.rough,
         )
         if abs(residual) <= STDS * part.interval:
             self.confirmed[part.object, part.property] = Confirmed(NOISE, weight)

@@ -249,6 +249,8 @@ class PropertyModel:
     def standing(self) -> Standing:
         """How much a prediction teaches that came out as such ones do."""
         c = self.clusterer
+        if self.undecided and not self._unsettled and not self.fallback.lawless:
+            return Standing.OPEN  # modes are exact: what tells which of them holds may come yet, or again
         if c.approximate or self.rough:
             return Standing.COARSE
         if self.undecided or c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:

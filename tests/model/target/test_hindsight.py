@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from points import learned, schema_of, transitions
 
 from relgym.config.constants import FIRST, MEMORY, NEARLY_ALL, RECENT
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.calibration import OWN
 from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction, ScenePrediction
 from relgym.model.target.hindsight import Hindsight, Standing
@@ -184,12 +185,31 @@ def test_right_predictions_make_up_for_wrong_ones(lottery: WorldModel) -> None:
     assert model.advice() == ()
 
 
-def test_what_stays_undecided_teaches_little_in_the_end(lottery: WorldModel) -> None:
-    """Half of what a record remembers came, and regressions are asked (`PropertyModel.rough`)."""
-    known = copy.deepcopy(lottery).property_model("self", "x")
-    for trials, standing in ((MEMORY // 2 - 1, Standing.OPEN), (MEMORY // 2, Standing.COARSE)):
-        known.calibration.trials = trials
-        assert known.undecided and known.standing is standing
+def either(n: int, seed: int, *, told: bool) -> list[Transition]:
+    """Two laws; which of them holds the state tells, or nothing."""
+    rng = np.random.default_rng(seed)
+    toss = iter(rng.random(n).tolist())
+    return transitions(
+        SCHEMA,
+        lambda s, u: [0.5 * s[0] + u[0] if (s[0] > 0.0 if told else next(toss) > 0.5) else s[0] - 1.0],
+        rng.normal(size=(n, 1)),
+        rng.normal(size=(n, 1)),
+    )
+
+
+def test_what_tells_laws_apart_is_found_however_long_nothing_did() -> None:
+    """Though half of what a record remembers came, and regressions are asked: laws may be told apart yet."""
+    model = WorldModel(SCHEMA)
+    for step in either(700, 0, told=False):
+        compare_and_learn(model, step, model.predict_one(step.before))
+    known = model.property_model("self", "x")
+    assert known.undecided and 2 * known.calibration.trials >= MEMORY
+    assert known.standing is Standing.OPEN
+    for step in either(900, 1, told=True):
+        compare_and_learn(model, step, model.predict_one(step.before))
+    fresh = either(200, 2, told=True)
+    right = [abs(model.predict_one(s.before).scene["self"]["x"] - s.after["self"]["x"]) < 1e-9 for s in fresh]
+    assert np.mean(right) >= 0.95
 
 
 def test_with_one_mode_there_is_no_choice() -> None:
