@@ -83,9 +83,9 @@ class ModelConfig:
         as claims may be off in: all of the first 133 are learned from, then one of 2, from the 200th on one of 3.
         Range [0, 0.5]; 0: nothing is left out. Raising it learns in less time, and from fewer examples near a
         condition's border. Of n of what is only roughly known, by approximations and regressions, or rests on such,
-        one of ``n / 64`` is learned from, until it is one of 32, as long as intervals hold as often as they are to, or
-        regressions tell it, which learn from all. One random number decides for all that a step shows, so that most
-        steps teach modes and clauses nothing.
+        one of ``n / 64`` is learned from, until it is one of 32, as long as intervals hold as often as they are to; but
+        regressions learn from all. One random number decides for all that a step shows, so that most steps teach modes
+        and clauses nothing.
     regression_columns
         Regressions on all that a target may depend on are made on at most so many columns, squares and products
         included. Default 320, range >= 0. A step costs as many products as the columns' square: some 0.1 ms.

@@ -1037,9 +1037,7 @@ class Calibration:
         weight, cell.passed = cell.passed + 1, 0
         return weight
 
-    def thin(
-        self, rough: Rough, draw: float, *, held: bool, misled: bool = False, taught: bool = False
-    ) -> int:
+    def thin(self, rough: Rough, draw: float, *, held: bool, misled: bool = False) -> int:
         """Take note of a prediction that is only roughly right; how many such ones it stands for, 0: another one will.
 
         The more of a winner there are, the less one more tells: `FIRST` of them tell what it leaves to 9 %.
@@ -1059,20 +1057,17 @@ class Calibration:
             Whether what came lay in its interval.
         misled
             As of `look_back`.
-        taught
-            Whether who spoke learns from it in any case, as regressions do: then more of them would mend nothing.
         """
         kind = self._cells.get(rough.key)
         cell = self._cells.get(_winner(rough.key)) if rough.key.winner else kind
         if cell is None or kind is None:
             return 1
         cell.steady += 1
-        if not taught:
-            cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
-            if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
-                cell.steady = 0
-        left_out = draw * min(cell.steady // FIRST, FEW) > 1.0 and (taught or cell.doubt < EVIDENCE)
-        if left_out and kind.squares[PERSISTENCE][0] >= FEW:
+        cell.doubt = min(max(0.0, cell.doubt + (_HELD if held else _OUTSIDE)), 2.0 * EVIDENCE)
+        if cell.doubt == 2.0 * EVIDENCE:  # those before were of another world
+            cell.steady = 0
+        left_out = draw * min(cell.steady // FIRST, FEW) > 1.0
+        if left_out and cell.doubt < EVIDENCE and kind.squares[PERSISTENCE][0] >= FEW:
             self.trials += 1
             kind.thinned += 1
             if not misled:

@@ -19,15 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from relgym.clustering.mode import NOISE
 from relgym.config.constants import FIRST, NEARLY_ALL, RECENT, ROUNDED, STDS
 from relgym.mixing import GOLDEN, MOST, mixed_one
-from relgym.model.predicting.calibration import (
-    OWN,
-    PERSISTENCE,
-    REGRESSION,
-    Audit,
-    Calibration,
-    Rough,
-    missed,
-)
+from relgym.model.predicting.calibration import OWN, PERSISTENCE, Audit, Calibration, Rough, missed
 from relgym.model.predicting.prediction import LateAudit, Outcome, Prediction, ScenePrediction
 
 if TYPE_CHECKING:
@@ -277,7 +269,6 @@ class _Look:
             self._draw,
             held=abs(residual) <= part.interval,
             misled=self._deceived(answer, record),
-            taught=record.speaker == REGRESSION and model.rough,
         )
         if abs(residual) <= STDS * part.interval:
             self.confirmed[part.object, part.property] = Confirmed(NOISE, weight)

@@ -1728,21 +1728,6 @@ def test_where_intervals_hold_less_often_all_is_learned_from() -> None:
     assert held[-100:].count(0) >= 90  # of five thousand one in 78 is learned from
 
 
-def test_of_what_a_regression_says_more_would_mend_nothing() -> None:
-    known, drawn = right(FEW), draws()
-    rough = Rough(KEY, REGRESSION, True, values(regression=0.3, now=1.0))
-    for _ in range(5_000):
-        known.thin(rough, next(drawn), held=True, taught=True)
-    weights = [known.thin(rough, next(drawn), held=False, taught=True) for _ in range(100)]
-    assert weights.count(0) >= 90
-    # Nor does what it says quiet doubts of the winner.
-    for _ in range(15):
-        thinned(known, next(drawn), held=False)
-    for _ in range(50):
-        known.thin(rough, next(drawn), held=True, taught=True)
-    assert thinned(known, next(drawn)) > 0
-
-
 def test_of_another_world_all_is_learned_from_as_of_the_first() -> None:
     known, drawn = right(FEW), draws()
     for _ in range(30_000):
