@@ -249,10 +249,9 @@ class PropertyModel:
     def standing(self) -> Standing:
         """How much a prediction teaches that came out as such ones do."""
         c = self.clusterer
-        if self.undecided and not self._unsettled and not self.fallback.lawless:
-            return Standing.OPEN  # modes are exact: what tells which of them holds may come yet, or again
-        if c.approximate or self.rough:
+        if self._unsettled or self.fallback.lawless:
             return Standing.COARSE
+        # Of laws that nothing tells apart, what does may come yet, or again.
         if self.undecided or c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
             return Standing.OPEN
         return Standing.SETTLED
