@@ -268,8 +268,10 @@ class ModeClusterer:
             self.population.scale = replace(self.scale, sigma=float(self.config.noise_std))
             return
         recent = self.rows[-256:]
-        own = table.x[recent][:, : table.signatures[table.signature_ids[recent[-1]]].core]
-        floor = rounding_noise(np.array([[self._largest]]), np.append(self.y[-256:], self._reach), own)
+        slots = table.signatures[table.signature_ids[recent[-1]]]
+        own = table.x[recent][:, : slots.core]
+        observed = np.delete(own, [k for k in slots.actions if k < slots.core], axis=1)
+        floor = rounding_noise(own, np.append(self.y[-256:], self._reach), observed)
         self.floor = floor
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:

@@ -30,31 +30,38 @@ __all__ = ["estimate_noise", "refuted", "rounding_noise"]
 
 
 def rounding_noise(
-    x: NDArray[np.float64], y: NDArray[np.float64], recent: NDArray[np.float64] | None = None
+    x: NDArray[np.float64], y: NDArray[np.float64], observed: NDArray[np.float64] | None = None
 ) -> float:
     """Standard deviation that mere rounding leaves, in units of y.
 
     Responses that float32 represents exactly are taken to have been rounded to it, as observations are. What counts
     then is their own size: a law's terms are rarely much larger than its value, and where they cancel, the estimate
-    from the data says so later. In double precision the columns count too, since the room is there.
+    from the data says so later. In double precision columns count, too, since the room is there: a term that varies as
+    much as y does carries as many roundings more as its column lies further from 0 than it varies. So the noise doesn't
+    depend on the units of columns, nor on what never varies; columns that vary by rounding explain nothing.
 
     Parameters
     ----------
     x
-        The target object's own columns, shape ``(n, d)``.
+        The target object's own columns and those of bodiless objects, shape ``(n, d)``.
     y
-        Responses, shape ``(n,)``.
-    recent
-        Recent rows of the target object's own columns. Where one that varies was rounded to single precision, so
-        were the responses, even if something was worked out from them since (an angle from its sine and cosine).
+        Responses, shape ``(m,)``.
+    observed
+        Those of the columns that are observed, not done, in recent rows, shape ``(k, c)``. Where one that varies was
+        rounded to single precision, so were the responses, even if something was worked out from them since (an angle
+        from its sine and cosine).
     """
     largest = float(np.abs(y).max(initial=0.0))
     single = 2.0 * float(np.finfo(np.float32).eps)  # of the value before and of the one after
     if bool(_single(y).all()) and bool(np.any(y != np.round(y))):
         return single * max(largest, float(np.finfo(np.float32).tiny))
-    if recent is not None and _rounded(recent):
+    if observed is not None and _rounded(observed):
         return single * max(largest, 1.0)
-    scale = max(float(np.abs(x).max(initial=0.0)), largest, ROUNDED)
+    size = np.abs(x).max(axis=0, initial=0.0)
+    varies = np.ptp(x, axis=0) if len(x) else np.zeros_like(size)
+    used = varies > ROUNDED * size
+    terms = size[used] / varies[used] * float(np.ptp(y)) if len(y) else size[used]
+    scale = max(float(terms.max(initial=0.0)), largest, ROUNDED)
     return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from relgym.clustering.noise import _quartile, _windows, estimate_noise, refuted, rounding_noise
 from relgym.config.constants import ENOUGH
@@ -12,9 +15,29 @@ EPS = float(np.finfo(np.float64).eps)
 EPS32 = float(np.finfo(np.float32).eps)
 
 
-def test_double_precision_leaves_some_roundings_of_the_largest_number() -> None:
-    x = np.array([[0.5], [-8.0]])
-    assert rounding_noise(x, np.array([0.1, 0.2])) == pytest.approx(32 * EPS * 8.0)
+def test_double_precision_leaves_some_roundings_of_the_largest_term() -> None:
+    y = np.array([0.1, 0.2])
+    assert rounding_noise(np.array([[0.5], [-8.0]]), y) == pytest.approx(32 * EPS * 0.2)
+    # A term that varies by .1 as its column does by 1 has the roundings of 100.
+    far = np.array([[1000.0], [1001.0]])
+    assert rounding_noise(far, y) == pytest.approx(32 * EPS * 100.1)
+    assert rounding_noise(1e9 * far, y) == pytest.approx(32 * EPS * 100.1)  # in whatever unit
+    # What never varies, or by rounding alone, is in no term.
+    still = np.array([[1e6, 1e6], [1e6, 1e6 * (1.0 + 4 * EPS)]])
+    assert rounding_noise(still, y) == pytest.approx(32 * EPS * 0.2)
+
+
+@given(
+    hnp.arrays(float, (12, 3), elements=st.floats(-100.0, 100.0)),
+    hnp.arrays(float, 12, elements=st.floats(-100.0, 100.0)),
+    st.integers(-20, 20),
+    st.integers(-20, 20),
+)
+def test_units_make_no_difference(x: np.ndarray, y: np.ndarray, columns: int, responses: int) -> None:
+    """Powers of 2, so that nothing is rounded on the way."""
+    y = np.append(y, 0.1)  # no response that single precision holds exactly
+    scaled = rounding_noise(2.0**columns * x, 2.0**responses * y)
+    assert scaled == pytest.approx(2.0**responses * rounding_noise(x, y))
 
 
 def test_single_precision_is_recognised_and_coarser() -> None:
@@ -35,7 +58,7 @@ def test_a_column_that_was_rounded_tells_of_responses_worked_out_from_it() -> No
     y = np.array([0.1, 0.2])  # an angle, say, of a sine and a cosine in single precision
     fractions = np.array([[0.125 * k + 0.0625] for k in range(ENOUGH)])
     for rows, coarse in ((fractions, True), (fractions[1:], False), (np.arange(20.0)[:, None], False)):
-        expected = 2.0 * EPS32 if coarse else 32.0 * EPS * 5.0
+        expected = 2.0 * EPS32 if coarse else 32.0 * EPS * 0.2
         assert rounding_noise(np.full((1, 1), 5.0), y, rows) == pytest.approx(expected)
     both = np.concatenate([np.pi * fractions, fractions], axis=1)
     assert rounding_noise(np.full((1, 1), 5.0), np.array([0.1, 30.1]), both) == pytest.approx(

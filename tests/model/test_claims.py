@@ -76,6 +76,15 @@ def clock(rng: np.random.Generator) -> Numbers:
             value += 1.0
 
 
+def regimes(rng: np.random.Generator) -> Numbers:
+    """A number that rises for a while, then falls for a while: once in 33 steps it turns, which nothing shows."""
+    value, rises = float(rng.normal()), False
+    while True:
+        yield (value,)
+        rises ^= bool(rng.random() < 0.03)
+        value += 0.3 if rises else -0.1
+
+
 def motor(rng: np.random.Generator) -> Acts:
     """A motor whose torque saturates, and how far it has turned; set anew once in a hundred steps."""
     w, turned = 0.0, 0.0
@@ -160,7 +169,7 @@ def squares(said: list[ScenePrediction], steps: list[Transition], prop: str) -> 
     return float(np.square(told - came).sum()), float(np.square(now - came).sum())
 
 
-@pytest.mark.parametrize("world", [pixels, byte, resampled, wrapped, clock])
+@pytest.mark.parametrize("world", [pixels, byte, resampled, wrapped, clock, regimes])
 def test_what_is_claimed_is_right(world: Callable[[np.random.Generator], Numbers]) -> None:
     props = ("x", "v") if world is pixels else ("x",)
     schema = schema_of(props)
