@@ -90,9 +90,12 @@ class ModeClassifier:
     @property
     def flawless(self) -> set[int]:
         """Modes that are told from all others without an error among the examples that are remembered."""
-        return set(self.modes) - {
-            mode for pair in self._pairs.values() if pair.errors > 0 or pair.stale for mode in pair.modes
-        }
+        return {mode for mode in self.modes if not self.alternatives(mode)}
+
+    def alternatives(self, mode: int) -> set[int]:
+        """Modes that one isn't told from without an error among the examples that are remembered."""
+        doubtful = [pair.modes for pair in self._pairs.values() if pair.errors > 0 or pair.stale]
+        return {other for pair in doubtful if mode in pair for other in pair} - {mode}
 
     @property
     def relations(self) -> frozenset[str]:

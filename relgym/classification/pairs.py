@@ -18,7 +18,7 @@ from relgym.classification.repair import mend
 from relgym.classification.views import Scope
 from relgym.config import ClassificationConfig
 from relgym.config.constants import CALL, NEARLY_ALL, SHORT
-from relgym.scheduling.work import Task
+from relgym.scheduling.work import Steps, Task, resumable
 
 __all__ = ["PairState", "covered_by", "pair_labels"]
 
@@ -44,7 +44,7 @@ class PairState:
     stale
         Whether it waits to be learned anew.
     draft
-        The classifier that is being learned anew, if that was begun; files don't keep it.
+        The classifier that is being mended or learned anew, if that was begun; files don't keep it.
     """
 
     classifier: BinaryClassifier
@@ -54,7 +54,7 @@ class PairState:
     contradictions: float = 0.0
     mended: bool = False
     stale: bool = False
-    draft: Task[BinaryClassifier] | None = None
+    draft: Task[tuple[BinaryClassifier, bool]] | None = None
     _taught: tuple[float, float] = (0.0, 0.0)  # what it is taught by
 
     @classmethod
@@ -102,23 +102,18 @@ class PairState:
         if self.draft is None:
             grown = min(lesson.counts) >= config.relearn_growth * max(min(self.learned), 1.0)
             mendable = not grown and all(lesson.counts)
-            mended = mend(self.classifier, lesson, self.errors, config) if mendable else None
-            work = (CALL + len(lesson.rows)) * (1 + len(self.classifier.definition.clauses))
-            if mended is not None:
-                self._adopt(mended, lesson, mended=True)
-                return work + mended.work
-            known = self.classifier
-            self.draft = Task(learn_pair, *self.modes, lesson.alone(), known.scope, config, known)
+            self.draft = Task(
+                renew, self.classifier, lesson.alone(), self.errors if mendable else None, config
+            )
             self._taught = lesson.counts
-            if mendable:
-                return work
         work = CALL + self.draft.advance(int(min(budget, sys.maxsize)))
         if self.draft.done:
-            found = self.draft.result
-            self.learned = self._taught
-            right = np.array(found.for_i)[found.decide_batch(lesson.view, lesson.rows)] == lesson.is_i
-            self.errors = float(lesson.weights[~right].sum())
-            self._adopt(found, lesson, mended=False)
+            found, mended = self.draft.result
+            if not mended:
+                self.learned = self._taught
+                right = np.array(found.for_i)[found.decide_batch(lesson.view, lesson.rows)] == lesson.is_i
+                self.errors = float(lesson.weights[~right].sum())
+            self._adopt(found, lesson, mended=mended)
         return work
 
     def _adopt(self, found: BinaryClassifier, lesson: Lesson, *, mended: bool) -> None:
@@ -140,6 +135,22 @@ class PairState:
         first, second = data["learned"]
         classifier = BinaryClassifier.from_dict(data["classifier"], scope)
         return cls(classifier, learned=(first, second), **plain)
+
+
+@resumable
+def renew(
+    known: BinaryClassifier, lesson: Lesson, allowed: float | None, config: ClassificationConfig
+) -> Steps[tuple[BinaryClassifier, bool]]:
+    """A classifier mended so that it errs on no more than is allowed, or learned anew; and whether it was mended.
+
+    None allowed: it isn't to be mended.
+    """
+    mended = None
+    if allowed is not None:
+        mended = yield from mend.steps(known, lesson, allowed, config)
+    if mended is not None:
+        return mended, True
+    return (yield from learn_pair.steps(known.i, known.j, lesson, known.scope, config, known)), False
 
 
 def pair_labels(

@@ -16,18 +16,21 @@ from relgym.classification.examples import Bools, Floats
 from relgym.classification.learning import Lesson, foil_config
 from relgym.classification.views import lift
 from relgym.config import ClassificationConfig
+from relgym.config.constants import CALL
 from relgym.logic.clause import ANY, Clause, Definition
 from relgym.logic.csp import matches
 from relgym.logic.facts import Facts
 from relgym.logic.foil import learn
 from relgym.logic.thresholds import merit, rounding, simplest_between
+from relgym.scheduling.work import Steps, resumable
 
 __all__ = ["mend"]
 
 
+@resumable
 def mend(
     broken: BinaryClassifier, lesson: Lesson, allowed: float, config: ClassificationConfig
-) -> BinaryClassifier | None:
+) -> Steps[BinaryClassifier | None]:
     """A mended classifier that errs on at most `allowed` weight of examples, or none.
 
     Classifiers with decision trees aren't mended: their trees would have to be learned anew anyway.
@@ -36,12 +39,21 @@ def mend(
         return None
     mending = _Mending.of(broken, lesson)
     work = len(lesson.rows) * (1 + len(broken.definition.clauses))
-    for definition in mending.changes(config):
+    yield CALL + work
+
+    def repaired(definition: Definition) -> BinaryClassifier | None:
+        nonlocal work
         work += definition.work + len(lesson.rows)
         mended = BinaryClassifier(broken.i, broken.j, broken.scope, broken.context, definition, work=work)
-        if mended.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights) <= allowed:
+        errors = mended.recount(lesson.view, lesson.rows, lesson.is_i, lesson.weights)
+        return mended if errors <= allowed else None
+
+    for definition in mending.changes():
+        yield CALL + len(lesson.rows)
+        if (mended := repaired(definition)) is not None:
             return mended
-    return None
+    added = yield from mending.added(config)
+    return None if added is None else repaired(added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +72,8 @@ class _Mending:
         table = np.array(covers, dtype=np.bool_).reshape(len(covers), len(lesson.rows))
         return cls(lesson, facts, broken.definition, lesson.is_i != broken.definition.negated, table)
 
-    def changes(self, config: ClassificationConfig) -> Iterator[Definition]:
-        """Changed definitions, the least change first."""
+    def changes(self) -> Iterator[Definition]:
+        """Definitions with a threshold moved, then those with a clause less."""
         clauses = self.definition.clauses
         for at, clause in enumerate(clauses):
             open_ = np.logical_not(np.delete(self.covers, at, axis=0).any(axis=0))
@@ -69,8 +81,6 @@ class _Mending:
                 yield self._with((*clauses[:at], moved, *clauses[at + 1 :]))
         for at in range(len(clauses)):
             yield self._with(clauses[:at] + clauses[at + 1 :])
-        if (more := self._added(config)) is not None:
-            yield more
 
     def _with(self, clauses: tuple[Clause, ...], work: int = 0) -> Definition:
         return Definition(clauses, 1, self.definition.negated, bits=self.definition.bits, work=work)
@@ -110,13 +120,13 @@ class _Mending:
             result[fits] = best(result[fits], numbers[tuples[fits, 0], slot])
         return np.where(np.isinf(result), np.nan, result)
 
-    def _added(self, config: ClassificationConfig) -> Definition | None:
+    def added(self, config: ClassificationConfig) -> Steps[Definition | None]:
         """The definition with one more clause, for the positives that it misses."""
         tuples, weights = self.lesson.view.tuples(self.lesson.rows), self.lesson.weights
         missed = self.positive & ~self.covers.any(axis=0)
         if not missed.any() or self.positive.all():
             return None
-        found = learn(
+        found = yield from learn.steps(
             self.facts,
             tuples[missed],
             tuples[~self.positive],

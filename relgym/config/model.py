@@ -39,8 +39,8 @@ class ModelConfig:
         transitions. Raising it finds sooner what is hard to find and makes every step of a world that isn't
         understood slower.
     most_cells
-        Largest number of cells that one transition spends; the last piece of work may overdraw it. Default 5,000,000,
-        some 20 ms, so that no step takes longer than a frame at 25 Hz.
+        Largest number of cells that one transition spends; the last piece of work may overdraw it. Default 7,500,000,
+        15 to 30 ms, so that no step takes longer than a frame at 25 Hz.
     saved_cells
         Cells that are saved for later where nothing is to be searched, and that there are to begin with. Default
         1,000,000,000, 4 s at most: worlds that can be understood are, before it is spent.
@@ -97,7 +97,7 @@ class ModelConfig:
     geometry: Literal["arrays", "fcl"] = "arrays"
     abstain: bool = True
     cells_per_step: int = 250_000
-    most_cells: int = 5_000_000
+    most_cells: int = 7_500_000
     saved_cells: int = 1_000_000_000
     frames: Literal["auto", "world"] = "auto"
     features: tuple[str, ...] = ()

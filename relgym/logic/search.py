@@ -69,7 +69,7 @@ def grow(tables: Tables, weights: Weights, config: FoilConfig, length: Descripti
     for depth in range(1, config.max_literals + 1):
         found = _Candidates(tables, beam, weights, score, config, length)
         work += tables.size * found.size
-        yield CALL * found.groups + tables.size * found.size // 2
+        yield 2 * CALL * found.groups + tables.size * found.size  # a group is laid out, and counted
         lookahead = config.lookahead if depth < config.max_literals else 0
         new = _new(found.best(), config.beam, pool) + _new(found.connecting(), lookahead, pool)
         beam = _promising(new, pool.values())

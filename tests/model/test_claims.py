@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import count, islice, pairwise
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -200,6 +201,33 @@ def test_what_is_claimed_is_right_where_things_are_done(world: Callable[[np.rand
     assert claimed_and_off(asked, fresh) <= 0.01
     if world is motor:
         assert all(each.ok for each in asked)
+
+
+def reweighed(rng: np.random.Generator) -> Acts:
+    """A mass on a spring, another one in each episode of 200 steps, which nothing shows."""
+    for k in count():
+        if k % 200 == 0:
+            x, v, mass = float(rng.normal()), float(rng.normal()), float(rng.uniform(0.5, 2.0))
+        u, now = float(rng.uniform(-1.0, 1.0)), (x, v)
+        v += 0.1 * (u - x) / mass
+        x += 0.1 * v
+        yield now, (u,), (x, v)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_of_laws_that_come_and_go_none_is_claimed(seed: int, tmp_path: Path) -> None:
+    model = WorldModel(schema_of(("x", "y"), ("u",)))
+    watched(model, acted(reweighed, seed, 1_600))
+    assert model.property_model("self", "y").calibration.fleeting
+    fresh = acted(reweighed, 50 + seed, 600)
+    asked = [model.predict_one(step.before) for step in fresh]
+    assert claimed_and_off(asked, fresh) <= 0.01
+    told = model.predict_batch(fresh[0].before.layout, np.array([step.before.vector for step in fresh]))
+    assert told.ok.tolist() == [each.ok for each in asked]
+    model.save(tmp_path / "model.relgym")
+    again = WorldModel.load(tmp_path / "model.relgym")
+    assert again.property_model("self", "y").calibration.fleeting
+    assert [again.predict_one(step.before).ok for step in fresh] == [each.ok for each in asked]
 
 
 def valley(rng: np.random.Generator, wide: float = 0.1) -> Acts:

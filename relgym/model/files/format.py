@@ -504,6 +504,7 @@ class CalibrationRecord(Record):
     changes: Bins
     cells: list[CellRecord]
     proven: Count = 0
+    fleeting: bool = False
     waiting: list[tuple[Kind, Expert, bool, list[Off | None]]] = []
 
 

@@ -597,6 +597,7 @@ class Calibration:
         )
         self._reliable: frozenset[int] | None = None
         self._proven = 0
+        self._fleeting = False
         self._everyone = tuple(range(self.experts))
         self._assessed: dict[tuple[Key, tuple[int, ...]], Assessment] = {}
         self._verdicts: dict[tuple[Key, tuple[bool, ...]], tuple[Assessment, bool]] = {}
@@ -645,6 +646,20 @@ class Calibration:
     def proven(self, bits: int) -> None:
         if bits != self._proven:
             self._proven = bits
+            self._changed()
+
+    @property
+    def fleeting(self) -> bool:
+        """Whether laws come and go (`relgym.model.target.ended.come_and_go`).
+
+        A mode is no surer then than all modes were lately, those that have ended included, nor its interval narrower.
+        """
+        return self._fleeting
+
+    @fleeting.setter
+    def fleeting(self, come_and_go: bool) -> None:
+        if come_and_go != self._fleeting:
+            self._fleeting = come_and_go
             self._changed()
 
     @property
@@ -764,7 +779,8 @@ class Calibration:
         share = self._right(key, speaker, _mean(family, speaker), heard) if self.trials else math.nan
         if not known:
             return Assessment(speaker, share, math.nan, math.nan)
-        half = self._half(trusted, speaker)
+        lasting = family if self._fleeting and key.winner > 0 and family is not None else trusted
+        half = self._half(lasting, speaker)
         trials, squares, _ = trusted.squares[speaker]
         return Assessment(speaker, share, half, math.sqrt(squares / trials) if trials else math.nan)
 
@@ -779,7 +795,9 @@ class Calibration:
         bits = self._bits(_who(key)) if speaker == OWN else 0.0
         said = heard[-1].records[speaker] if heard else _Record()
         share = said.share_of(speaker, prior, bits)
-        return min(share, heard[-1].credit(prior, bits)) if heard and speaker == OWN else share
+        if heard and speaker == OWN:
+            share = min(share, heard[-1].credit(prior, bits))
+        return min(share, prior) if self._fleeting and key.winner > 0 else share
 
     def _mean_of_all(self, speaker: int) -> float:
         """`_mean` of who makes no claims in all cells together."""
@@ -875,6 +893,8 @@ class Calibration:
         who, cell = _who(key), self._cells.get(key)
         if self._far_out(key) and (cell is None or cell.squares[PERSISTENCE][0] < FEW):
             return False  # too few have shown what an approximation is worth there
+        if self._fleeting and who > 0:  # what is in force now isn't all that is to be claimed
+            return told.probability >= 1.0 - self.allowed
         if who not in self._least:
             self._least[who] = self._needed(who)
         like = [cell] if cell is not None else self._alike(key)
@@ -1242,6 +1262,7 @@ class Calibration:
             "slips": list(self._slips),
             "vouched": self._vouched,
             **({"proven": self._proven} if self._proven else {}),
+            **({"fleeting": True} if self._fleeting else {}),
             "changes": [[place, count] for place, count in sorted(self._changes.items())],
             **({"waiting": [_plain(each) for each in self._waiting]} if self._waiting else {}),
             "cells": [
@@ -1285,6 +1306,7 @@ class Calibration:
         found._slips = [float(each) for each in data["slips"]]
         found._vouched = float(data["vouched"])
         found._proven = int(data.get("proven", 0))
+        found._fleeting = bool(data.get("fleeting", False))
         found._changes = _bins(data["changes"])
         found._waiting = [
             Rough(

@@ -30,7 +30,7 @@ from relgym.model.predicting.prediction import OUTCOMES, Outcome, Prediction
 from relgym.model.target.candidates import Candidates
 from relgym.model.target.casting import Casting
 from relgym.model.target.conditions import Conditions, needed
-from relgym.model.target.ended import ended
+from relgym.model.target.ended import come_and_go, ended
 from relgym.model.target.fallback import Fallback
 from relgym.model.target.functions import ModeFunctions, Verdict, bodies_of
 from relgym.model.target.guess import Guesses
@@ -231,9 +231,11 @@ class PropertyModel:
             self.clusterer.labels,
             self.classifier.modes,
             lambda mode: known.failing(Key(_PREDICTED, mode, 0)),
+            self.classifier.alternatives,
         )
         if over:
             self.past |= over
+            known.fleeting |= come_and_go(self.clusterer.labels, self.past)
             self.hindsight = Hindsight()  # another vote is taken from now on
         return bool(over)
 

@@ -126,6 +126,23 @@ def test_a_new_mode_speaks_at_once_where_those_before_it_were_right() -> None:
     assert known.claims(Key(0, 2, 3), told)
 
 
+def test_where_laws_come_and_go_one_is_no_surer_than_all_of_them() -> None:
+    known = Calibration(0.5)
+    for mode in range(1, 7):
+        for k in range(100):
+            seen(known, values(own=1.0), 1.0 if k < 90 or mode == 6 else 4.0, Key(0, mode, 3))
+    key = Key(0, 6, 3)
+    sure = known.assess(key, values(own=1.0))
+    assert sure.probability > 0.99 and known.claims(key, sure)
+    known.fleeting = True
+    told = known.assess(key, values(own=1.0))
+    assert told.probability == pytest.approx(0.9, abs=0.02)
+    assert told.speaker == OWN and not known.claims(key, told)
+    assert told.interval > 2.0  # one in ten was off by 3
+    again = Calibration.from_json(known.to_json(), 0.5)
+    assert again.fleeting and again.assess(key, values(own=1.0)) == told
+
+
 @pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
 def test_a_few_misses_of_a_sure_law_end_its_record(hits: int, misses: int) -> None:
     known = right(hits)

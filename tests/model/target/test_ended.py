@@ -12,7 +12,7 @@ from relgym.model.target.ended import ended
 def over(*held: int, away: int) -> bool:
     """Whether mode 1, which held for such runs with another one for the even ones between, has ended now."""
     labels = np.concatenate([np.full(run, 1 + k % 2) for k, run in enumerate(held)] + [np.full(away, 2)])
-    return ended(labels, [1, 2], lambda mode: mode == 1) == {1}
+    return ended(labels, [1, 2], lambda mode: mode == 1, {1: [2], 2: [1]}.__getitem__) == {1}
 
 
 def test_what_never_left_has_ended_after_ten_examples_of_another() -> None:
@@ -40,7 +40,15 @@ def test_the_longer_it_is_away_the_more_surely_it_has_ended(runs: list[int]) -> 
     assert not found[0]
 
 
+def test_what_is_told_apart_is_not_missed_while_the_other_holds() -> None:
+    labels = np.array([1, 1, 3, 3, 3] * 20 + [3] * 300 + [2] * 9 + [3] * 300)
+    alike = {1: [2], 2: [1], 3: []}
+    assert ended(labels, [1, 2, 3], lambda mode: mode == 1, alike.__getitem__) == set()
+    assert ended(np.append(labels, 2), [1, 2, 3], lambda mode: mode == 1, alike.__getitem__) == {1}
+
+
 def test_of_all_modes_not_every_one_has_ended() -> None:
     labels = np.array([1] * 40 + [2] * 40 + [3] * 40)
-    assert ended(labels, [1, 2, 3], lambda mode: True) == {1, 2}
-    assert ended(labels, [1, 2], lambda mode: True) == set()
+    alike = {1: [2, 3], 2: [1, 3], 3: [1, 2]}
+    assert ended(labels, [1, 2, 3], lambda mode: True, alike.__getitem__) == {1, 2}
+    assert ended(labels, [1, 2], lambda mode: True, alike.__getitem__) == set()
