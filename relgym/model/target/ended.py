@@ -103,4 +103,4 @@ def come_and_go(labels: NDArray[np.int32], past: Collection[int]) -> bool:
     """
     held = [np.flatnonzero(labels == mode) for mode in past]
     times = [np.quantile(each, (SMALL, NEARLY_ALL)) for each in held if len(each) > max(FOUNDING)]
-    return len(times) > 1 and max(begun for begun, _ in times) > min(over for _, over in times)
+    return len(times) > 1 and bool(max(begun for begun, _ in times) > min(over for _, over in times))
