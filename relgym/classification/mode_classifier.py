@@ -90,12 +90,16 @@ class ModeClassifier:
     @property
     def flawless(self) -> set[int]:
         """Modes that are told from all others without an error among the examples that are remembered."""
-        return {mode for mode in self.modes if not self.alternatives(mode)}
+        return set(self.modes).difference(*self._doubtful)
 
     def alternatives(self, mode: int) -> set[int]:
         """Modes that one isn't told from without an error among the examples that are remembered."""
-        doubtful = [pair.modes for pair in self._pairs.values() if pair.errors > 0 or pair.stale]
-        return {other for pair in doubtful if mode in pair for other in pair} - {mode}
+        return {other for pair in self._doubtful if mode in pair for other in pair if other != mode}
+
+    @property
+    def _doubtful(self) -> list[tuple[int, int]]:
+        """Pairs that aren't told apart without an error."""
+        return [pair.modes for pair in self._pairs.values() if pair.errors > 0 or pair.stale]
 
     @property
     def relations(self) -> frozenset[str]:

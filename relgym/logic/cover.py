@@ -91,9 +91,8 @@ class Cover:
             clause = prune(Clause.of(growing.literals, self._tables.arity), rest)
             clause = center_thresholds(clause.connected(), rest)
             covered = problem.count(alive & problem.matches(clause))
-            yield (
-                2 * CALL * (1 + 2 * len(growing.literals))
-            )  # pruned: matched without each of them, and again
+            # It is matched once, and pruned: matched without each of its literals, and again.
+            yield 2 * CALL * (1 + 2 * len(growing.literals))
             if self._accepts(clause, covered, problem.count(alive)):
                 return clause
         return None

@@ -39,6 +39,9 @@ the mode; so its record is of steps in which what it reads was right, and it is 
 it is learned again when a mode holds, and then without an error in a world that laws explain, what it got wrong before
 was another rule's fault: its record begins anew (`Calibration.revise`), with less credit each time.
 
+Where laws come and go (`Calibration.fleeting`), that one has been right since it was found says little of what comes
+next: it is no surer, and its interval no narrower, than what all modes said lately came out.
+
 A prediction is claimed only where its winner speaks and its probability is at least `ModelConfig.claim_probability`.
 Claims are rationed: of all kinds the surest ones, as many as are expected to be off in no more than
 `ModelConfig.claim_slips` of the target's predictions (selective prediction: Geifman & El-Yaniv 2017). That is reckoned
@@ -1251,6 +1254,7 @@ class Calibration:
         for cell in found._cells.values():  # a number stands for another mode here, maybe
             cell.steady, cell.passed, cell.thinned, cell.doubt = 0, 0, 0, 0.0
         found._waiting = []
+        found._fleeting = self._fleeting or other._fleeting
         found.trials = self.trials + other.trials
         return found
 

@@ -85,7 +85,8 @@ def _news(holds: NDArray[np.bool_]) -> bool:
 def come_and_go(labels: NDArray[np.int32], past: Collection[int]) -> bool:
     """Whether a law that took the place of one that had ended has ended itself.
 
-    One that held for more than found it: what is made of the turmoil of a change doesn't last.
+    Laws count that held for more examples than it takes to find one: what is found while a change is under way is
+    often a mixture of both, and is soon replaced.
 
     Parameters
     ----------

@@ -141,6 +141,8 @@ def test_where_laws_come_and_go_one_is_no_surer_than_all_of_them() -> None:
     assert told.interval > 2.0  # one in ten was off by 3
     again = Calibration.from_json(known.to_json(), 0.5)
     assert again.fleeting and again.assess(key, values(own=1.0)) == told
+    for merged in (known.united(right(5)), right(5).united(known), right(900).united(known)):
+        assert merged.fleeting
 
 
 @pytest.mark.parametrize(("hits", "misses"), [(100, 3), (500, 2)])
