@@ -764,7 +764,7 @@ class Calibration:
                 for k in able
                 if k != speaker and (_only_values(speaker, k) or trusted.undecided(speaker, k))
             ]
-            usual, wider = self._usual(known[0], able, speaker) if others else (speaker, trusted)
+            usual, wider = self._usual(known[0], able, speaker, trusted) if others else (speaker, trusted)
             if usual not in others and trusted.rough(speaker):
                 usual, wider = self._instead(able, speaker, trusted), self._whole()
                 others = [usual] if usual != speaker else []
@@ -821,15 +821,16 @@ class Calibration:
         told = self._assess(nearer, able)
         return told._replace(probability=min(told.probability, 0.5))
 
-    def _usual(self, winner: _Cell, able: tuple[int, ...], speaker: int) -> tuple[int, _Cell]:
+    def _usual(self, winner: _Cell, able: tuple[int, ...], speaker: int, trusted: _Cell) -> tuple[int, _Cell]:
         """Who codes better than who would speak, by enough, in all cells of a winner, or in all; and in which.
 
         Who makes no claims is known by all cells together: what one kind shows of two of them is the luck of a few
         episodes, in each of which errors are alike.
         """
-        best = winner.preferred(able, (self.probability, self.allowed))
-        if best != speaker and not _only_values(best, speaker) and winner.lead(best, speaker) >= EVIDENCE:
-            return best, winner
+        if winner is not trusted:
+            best = winner.preferred(able, (self.probability, self.allowed))
+            if best != speaker and not _only_values(best, speaker) and winner.lead(best, speaker) >= EVIDENCE:
+                return best, winner
         if _makes_claims(speaker):
             return speaker, winner
         return self._anywhere(able, speaker), self._whole()

@@ -40,7 +40,7 @@ from relgym.program.records import VALUED
 from relgym.scene.objects import Scene, SceneLayout, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["Odds", "Said", "derive", "latest_values", "predict", "predict_many", "settled"]
+__all__ = ["Odds", "Said", "derive", "predict", "predict_many", "settled"]
 
 _PREDICTED, _OUTSIDE, _DEPENDS, _UNEXPLAINED, _UNSURE = (
     OUTCOMES.index(o)
@@ -225,7 +225,7 @@ def _overruled(
     return Audit(key, values, OWN)
 
 
-def latest_values(
+def _latest_values(
     parts: Parts, model: PropertyModel, percept: Percept, index: int, following: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     """What the mode that held last says of one object of n scenes, shape ``(n,)``; None where nobody asks it.
@@ -264,7 +264,7 @@ def _experts_one(
         found[GUESS] = math.nan if guessed is None else float(guessed[0])
     if lawful:
         return tuple(found)
-    latest = latest_values(parts, model, percept, index, following[None])
+    latest = _latest_values(parts, model, percept, index, following[None])
     found[LATEST] = math.nan if latest is None else float(latest[0])
     changes = parts.regressed(percept, index, target.property) if model.asks_regressions else None
     if changes is not None:
@@ -299,7 +299,7 @@ def _experts(
     guessed = model.fallback.guessed(percept, index, following) if model.fallback.guesses_something else None
     if guessed is not None:
         found[:, GUESS] = np.where(np.isfinite(guessed), guessed, np.nan)
-    latest = None if parts.governs(target) else latest_values(parts, model, percept, index, following)
+    latest = None if parts.governs(target) else _latest_values(parts, model, percept, index, following)
     if latest is not None:
         found[:, LATEST] = np.where(np.isfinite(latest), latest, np.nan)
     if model.asks_regressions and not parts.governs(target):

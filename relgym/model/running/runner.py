@@ -32,7 +32,7 @@ from relgym.model.predicting.prediction import (
     Prediction,
     ScenePrediction,
 )
-from relgym.model.predicting.querying import Odds, Said, derive, latest_values, settled
+from relgym.model.predicting.querying import Odds, Said, derive, settled
 from relgym.model.predicting.regression import Regression
 from relgym.model.running.compiled import KERNEL
 from relgym.model.running.grounds import Grounds
@@ -404,10 +404,10 @@ class Runner:
                 return None
             model, lawful = teller.model, a.component >= 0
             others = None if model.candidates else teller.values(said, numbers)
-            if others is not None and resumes and not lawful:
-                latest = latest_values(parts, model, percept, teller.index, following[None])
-                if latest is not None and math.isfinite(latest[0]):
-                    others = (*others[:LATEST], float(latest[0]), *others[LATEST + 1 :])
+            if others is not None and resumes and not lawful and model.asks_latest:
+                (latest,) = model.latest_values(percept, teller.index, following[None]).tolist()
+                if math.isfinite(latest):
+                    others = (*others[:LATEST], latest, *others[LATEST + 1 :])
             away = far[k] if far[k] and raw.mode and not lawful and model.tells_how_far else 0
             known = raw, odds, others, away, teller.relied_on
             one = settled(parts, model, percept, teller.index, following, *known, lawful=lawful)

@@ -251,7 +251,7 @@ class _Look:
         are is counted of all.
         """
         record, model = part.record, answer.model
-        if not self._share or record is None or (model.follows_latest and model.cast):
+        if not self._share or record is None or (model.cast and model.follows_latest):
             return False
         if math.isnan(part.interval):  # too few came out to tell
             self._stands = 1
