@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from relgym.arguments import finite
 from relgym.config.checks import checked_count
+from relgym.envs.agents import AgentsSpace
 from relgym.errors import ActionError, ConfigError
 from relgym.scene.objects import Float1D
 from relgym.scene.schema import SceneSchema
@@ -24,6 +25,7 @@ from relgym.scene.schema import SceneSchema
 __all__ = [
     "Coefficient",
     "action_numbers",
+    "action_parts",
     "check_options",
     "checked_action",
     "checked_actions",
@@ -149,8 +151,12 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
 
     Returns
     -------
-    For a Box a float64 array of its shape, otherwise `action` itself.
+    For a Box a float64 array of its shape, for a Dict or a Tuple one of parts that were checked so, otherwise `action`
+    itself.
     """
+    if isinstance(space, (spaces.Dict, spaces.Tuple)):
+        parts = {key: checked_action(part, given) for key, part, given in action_parts(space, action)}
+        return tuple(parts.values()) if isinstance(space, spaces.Tuple) else parts
     if not isinstance(space, spaces.Box):
         if not _chosen(space, action) and not space.contains(action):
             raise ActionError(f"action {action!r} lies outside {space}")
@@ -168,6 +174,33 @@ def checked_action(space: spaces.Space[Any], action: Any) -> Any:
             "clip or rescale it"
         )
     return np.clip(array, space.low, space.high)
+
+
+def action_parts(
+    space: spaces.Dict | spaces.Tuple[Any], action: Any
+) -> list[tuple[str | int, spaces.Space[Any], Any]]:
+    """Key, space and value of each part of an action, in the space's order; agents that don't act have none.
+
+    Raises
+    ------
+    ActionError
+        The action has other parts than the space.
+    """
+    if isinstance(space, spaces.Tuple):
+        if not isinstance(action, (tuple, list)) or len(action) != len(space.spaces):
+            raise ActionError(
+                f"expected a tuple of {len(space.spaces)} parts, one of each of {space}, got {action!r}"
+            )
+        return [(k, part, given) for k, (part, given) in enumerate(zip(space.spaces, action, strict=True))]
+    keys = list(space.spaces)
+    few = isinstance(space, AgentsSpace)
+    if (
+        not isinstance(action, Mapping)
+        or not set(action) <= set(keys)
+        or not (few or len(action) == len(keys))
+    ):
+        raise ActionError(f"expected a dict with the keys {keys}, got {action!r}")
+    return [(key, space.spaces[key], action[key]) for key in keys if key in action]
 
 
 def _chosen(space: spaces.Space[Any], action: Any) -> bool:

@@ -12,7 +12,7 @@ from gymnasium import spaces
 
 from relgym.arguments import refusing
 from relgym.envs.agents import AgentsSpace
-from relgym.envs.arguments import checked_action, checked_function
+from relgym.envs.arguments import action_parts, checked_action, checked_function
 from relgym.envs.model_files import made_how
 from relgym.envs.views import AgentsView, NumbersView, SceneView, TaskView, View, view_from_json
 from relgym.errors import ActionError, ConfigError, RelgymError
@@ -201,6 +201,15 @@ def readable(space: spaces.Space[Any], action: Any) -> Any:
     same, is learned from as it was given; what the env makes of it (most clip it) is part of its laws. NaN, other
     shapes, and choices that a discrete space doesn't have can't be read.
     """
+    if isinstance(space, (spaces.Dict, spaces.Tuple)):
+        try:
+            parts = action_parts(space, action)
+        except ActionError:
+            return None
+        known = {key: readable(part, given) for key, part, given in parts}
+        if any([part is None for part in known.values()]):
+            return None
+        return tuple(known.values()) if isinstance(space, spaces.Tuple) else known
     try:
         return checked_action(space, action)
     except ActionError:

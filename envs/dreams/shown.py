@@ -338,9 +338,10 @@ class ViewDeeds:
     """
 
     def __init__(self, view: View, layout: SceneLayout, space: spaces.Space[Any]) -> None:
-        if isinstance(space, AgentsSpace):
+        if isinstance(space, (spaces.Dict, spaces.Tuple)):
+            whose = "of several agents" if isinstance(space, AgentsSpace) else f"with actions of {space}"
             raise ConfigError(
-                "dreams of several agents are dreamt one at a time: gym.make('relgym/LearnedModel-v0', ...), or "
+                f"dreams {whose} are dreamt one at a time: gym.make('relgym/LearnedModel-v0', ...), or "
                 "gym.vector.SyncVectorEnv of such"
             )
         self._view, self._space, self._bare = view, space, layout

@@ -1,4 +1,4 @@
-"""Actions of any flat space as properties of the bodiless object `action`."""
+"""Actions as properties of the bodiless object `action`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.actions import without_action
-from relgym.envs.arguments import action_numbers
+from relgym.envs.arguments import action_numbers, action_parts
 from relgym.envs.views.records import identifiers
 from relgym.errors import ActionError, ConfigError
 from relgym.model.percepts.scenes import scene_of
@@ -33,10 +33,11 @@ class Acts:
     Parameters
     ----------
     space
-        A flat Box, Discrete, MultiDiscrete or MultiBinary.
+        A flat Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of those.
     names
         For a Discrete space the names of its choices (default ``a_is_0``, ``a_is_1``, …); for other spaces those
-        of an action's numbers (default ``a`` if it is one, else ``a0``, ``a1``, …).
+        of an action's numbers (default ``a`` if it is one, else ``a0``, ``a1``, …; in a Dict the key in place of the
+        ``a``).
 
     Raises
     ------
@@ -50,15 +51,22 @@ class Acts:
     ('a', 'left', 'nothing', 'right')
     >>> acts.values(2)
     array([2., 0., 0., 1.])
+    >>> arm = Acts(spaces.Dict({"grip": spaces.Discrete(2), "move": spaces.Box(-1.0, 1.0, (2,))}))
+    >>> arm.properties
+    ('grip', 'move0', 'move1')
+    >>> arm.values({"grip": 1, "move": np.array([0.5, -0.5])})
+    array([ 1. ,  0.5, -0.5])
     """
 
     def __init__(self, space: spaces.Space[Any], names: Sequence[str] | None = None) -> None:
         self.space = space
         self.names = None if names is None else tuple(names)
         self._latest: tuple[SceneLayout, SceneLayout, int] | None = None  # without an action, and with one
-        self._starts, self._counts = _choices(space)
+        self._parts = {key: _choices(part) for key, part in _flat_parts(space).items()}
+        self._starts = [start for starts, _ in self._parts.values() for start in starts]
+        self._counts = [count for _, counts in self._parts.values() for count in counts]
         discrete = isinstance(space, spaces.Discrete)
-        given = self.names if self.names is not None and not discrete else _numbered(len(self._starts))
+        given = self.names if self.names is not None and not discrete else self._own_names()
         identifiers("names of an action's numbers", given, len(self._starts))
         labels = [
             [] if not 3 <= count <= MOST_CHOICES else [f"{name}_is_{k + start:g}" for k in range(count)]
@@ -69,13 +77,15 @@ class Acts:
             labels = [list(self.names)]
         indicators = tuple(label for part in labels for label in part)
         self.properties = (*given, *indicators)
-        self._flags = given if isinstance(space, spaces.MultiBinary) else indicators
+        binary = [isinstance(part, spaces.MultiBinary) for part in _flat_parts(space).values()]
+        told = [flag for flag, (starts, _) in zip(binary, self._parts.values(), strict=True) for _ in starts]
+        self._flags = (*(name for name, flag in zip(given, told, strict=True) if flag), *indicators)
         self._indicated = [k for k, part in enumerate(labels) if part]
 
     def check(self, space: spaces.Space[Any]) -> None:
         """Raise `ConfigError` unless actions of a space mean here what they mean there."""
         try:
-            same = _choices(space) == (self._starts, self._counts)
+            same = {key: _choices(part) for key, part in _flat_parts(space).items()} == self._parts
         except ConfigError:
             same = False
         if not same:
@@ -91,7 +101,7 @@ class Acts:
 
     def values(self, action: Any) -> Float1D:
         """Properties of the action object, shape ``(len(properties),)``, for a legal action."""
-        numbers = action_numbers(action, len(self._counts))
+        numbers = self._numbers(action)
         if not self._indicated:
             return numbers
         shown = [numbers]
@@ -104,8 +114,16 @@ class Acts:
             shown.append(one_hot)
         return np.concatenate(shown)
 
+    def _numbers(self, action: Any) -> Float1D:
+        """An action's own numbers, part by part."""
+        space = self.space
+        if not isinstance(space, (spaces.Dict, spaces.Tuple)):
+            return action_numbers(action, len(self._counts))
+        given = action_parts(space, action)
+        return np.concatenate([action_numbers(part, len(self._parts[key][0])) for key, _, part in given])
+
     def values_batch(self, actions: Any) -> Float2D:
-        """`values` of n actions, shape ``(n, len(properties))``; the same bits."""
+        """`values` of n actions of a flat space, shape ``(n, len(properties))``; the same bits."""
         try:
             numbers = np.asarray(actions, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
@@ -130,9 +148,24 @@ class Acts:
         parts = (bare.vector[:at], self.values(action), bare.vector[at:])
         return scene_of(schema, layout, np.concatenate(parts))
 
+    def _own_names(self) -> tuple[str, ...]:
+        """Names of the numbers if none are given."""
+        if not isinstance(self.space, spaces.Dict):
+            return _numbered("a", len(self._starts))
+        return tuple(
+            name for key, (starts, _) in self._parts.items() for name in _numbered(str(key), len(starts))
+        )
 
-def _numbered(count: int) -> tuple[str, ...]:
-    return ("a",) if count == 1 else tuple(f"a{k}" for k in range(count))
+
+def _numbered(name: str, count: int) -> tuple[str, ...]:
+    return (name,) if count == 1 else tuple(f"{name}{k}" for k in range(count))
+
+
+def _flat_parts(space: spaces.Space[Any]) -> dict[str | int | None, spaces.Space[Any]]:
+    """The parts of a Dict by key, those of a Tuple by place; of another space the whole."""
+    if isinstance(space, spaces.Dict):
+        return {key: part for key, part in space.spaces.items()}
+    return dict(enumerate(space.spaces)) if isinstance(space, spaces.Tuple) else {None: space}
 
 
 def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:
@@ -146,7 +179,7 @@ def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:
         size = int(np.prod(space.shape))
         return [0.0] * size, [0] * size
     raise ConfigError(
-        f"the action space is {space}: expected Box, Discrete, MultiDiscrete or MultiBinary; flatten it: "
-        "gymnasium.wrappers.TransformAction(env, function, space), where the space is one of these and the function "
-        "makes the env's action of one of its actions"
+        f"actions of {space}: expected Box, Discrete, MultiDiscrete, MultiBinary, or one level of Dict or Tuple of "
+        "those; flatten it: gymnasium.wrappers.TransformAction(env, function, space), where the space is one of these "
+        "and the function makes the env's action of one of its actions"
     )

@@ -12,8 +12,10 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import (
     action_numbers,
+    action_parts,
     check_options,
     checked_action,
     checked_actions,
@@ -135,6 +137,33 @@ def test_actions_of_other_spaces_lie_in_them() -> None:
     assert checked_action(spaces.Discrete(3), 2) == 2
     with pytest.raises(ActionError, match="action 3 lies outside"):
         checked_action(spaces.Discrete(3), 3)
+
+
+ARM = spaces.Dict({"grip": spaces.Discrete(2), "move": BOX})
+PAIR = spaces.Tuple((spaces.Discrete(2), BOX))
+
+
+def test_actions_of_parts_are_checked_part_by_part() -> None:
+    found = checked_action(ARM, {"move": [1.0 + 5e-7, 1.0], "grip": 1})
+    assert list(found) == ["grip", "move"] and found["grip"] == 1 and found["move"].tolist() == [1.0, 1.0]
+    chosen, moved = checked_action(PAIR, [0, np.array([0.5, 1.0], np.float32)])
+    assert chosen == 0 and moved.dtype == np.float64 and moved.tolist() == [0.5, 1.0]
+    with pytest.raises(ActionError, match="action 2 lies outside"):
+        checked_action(ARM, {"grip": 2, "move": [0.0, 1.0]})
+    for bad in ({"grip": 1}, {"grip": 1, "move": [0.0, 1.0], "look": 0}, (1, [0.0, 1.0]), 1, None):
+        with pytest.raises(ActionError, match=r"expected a dict with the keys \['grip', 'move'\]"):
+            checked_action(ARM, bad)
+    for bad in ((1,), (1, [0.0, 1.0], 0), {0: 1, 1: [0.0, 1.0]}, 1, None):
+        with pytest.raises(ActionError, match="expected a tuple of 2 parts"):
+            checked_action(PAIR, bad)
+
+
+def test_agents_that_are_gone_do_not_act() -> None:
+    space = AgentsSpace({"a": spaces.Discrete(2), "b": spaces.Discrete(2)})
+    assert action_parts(space, {"b": 1}) == [("b", spaces.Discrete(2), 1)]
+    assert action_parts(space, {}) == []
+    with pytest.raises(ActionError, match=r"expected a dict with the keys \['a', 'b'\]"):
+        action_parts(space, {"c": 1})
 
 
 @given(st.integers(1, 4), st.data())

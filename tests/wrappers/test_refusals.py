@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -15,9 +16,11 @@ from plain_envs import Slider
 from relgym.config import ModelConfig
 from relgym.envs.views import FunctionView, NumbersView, Part, SceneView, TableView, TaskView
 from relgym.errors import ConfigError, ObservationError
+from relgym.planning.actions import ActionCoder
 from relgym.scene.objects import ObjectType
 from relgym.scene.schema import SceneSchema
 from relgym.wrappers import ModelLearner
+from relgym.wrappers.views import readable
 
 PUSHES = Slider().action_space
 NUMBER = spaces.Box(-9.0, 9.0, (2,), np.float64)
@@ -80,20 +83,48 @@ def test_a_key_called_action_is_given_another_name() -> None:
 
 
 # ---------------------------------------------------------------------- action spaces
+STEPS = spaces.Discrete(2)
+
+
 @pytest.mark.parametrize(
-    "space", [spaces.Dict({"a": spaces.Discrete(2)}), spaces.Tuple([spaces.Discrete(2), spaces.Discrete(3)])]
+    "space", [spaces.Dict({"a": spaces.Dict({"b": STEPS})}), spaces.Tuple([STEPS, spaces.Text(3)])]
 )
 def test_nested_actions_are_made_of_flat_ones(space: Any) -> None:
     env = Seen(NUMBER, space)
     with pytest.raises(ConfigError, match=r"TransformAction\(env, function, space\)"):
         ModelLearner(env)
-    parts: Any = {"a": 0} if isinstance(space, spaces.Dict) else None
-    flat = TransformAction(
-        env,
-        lambda given: {"a": given[0]} if parts else tuple(given),
-        spaces.MultiDiscrete([2, 3][: len(space)]),
-    )
-    learns(flat)
+    within = isinstance(space, spaces.Dict)
+    learns(TransformAction(env, lambda step: {"a": {"b": step}} if within else (step, "abc"), STEPS))
+
+
+@pytest.mark.parametrize("kind", [spaces.Dict, spaces.Tuple])
+def test_actions_may_have_parts(kind: Any, tmp_path: Path) -> None:
+    parts: Any = {"grip": spaces.Discrete(3), "push": PUSHES}
+    space = spaces.Dict(parts) if kind is spaces.Dict else spaces.Tuple(tuple(parts.values()))
+    place = "push" if kind is spaces.Dict else 1
+
+    def made(grip: int, push: Any) -> Any:
+        return {"grip": grip, "push": push} if kind is spaces.Dict else (grip, push)
+
+    env = ModelLearner(TransformAction(Slider(), lambda acted: acted[place], space))
+    run(env, 100)
+    assert env.model.seen == 100 and env.skipped == 0
+    scene = env.view.scene(env.observation_space.sample())
+    wide = np.full(PUSHES.shape, 9.0)  # outside, but an env may take it
+    taken = env.view.with_action(scene, readable(space, made(2, wide)))
+    assert taken["action"].values.tolist() == [2.0, *wide, 0.0, 0.0, 1.0]
+    wrong: list[Any] = [0, None, {"grip": 2}, (2,), made(7, wide), made(0, wide[:0]), made(0, wide * np.nan)]
+    assert [readable(space, each) for each in wrong] == [None] * len(wrong)
+
+    env.save(tmp_path / "model.json")
+    dream = gym.make("relgym/LearnedModel-v0", model=tmp_path / "model.json")
+    assert dream.action_space == space
+    dream.reset(seed=0)
+    dream.step(dream.action_space.sample())
+    with pytest.raises(ConfigError, match="dreamt one at a time"):
+        gym.make_vec("relgym/LearnedModel-v0", num_envs=2, model=tmp_path / "model.json")
+    with pytest.raises(ConfigError, match="can't plan actions of"):
+        ActionCoder(space)
 
 
 BODY = SceneSchema((ObjectType("body", ("x", "v")),), (("body", "body"),))
