@@ -47,11 +47,11 @@ class Standing(Enum):
     Attributes
     ----------
     SETTLED
-        Nothing: modes are laws, and nothing is being looked for. Little if they read what is known only roughly.
+        Nothing: modes are laws. Little if they read what is known only roughly.
     COARSE
         Little: it is known only roughly what comes, and nothing tells more.
     OPEN
-        As much as any: something is being looked for, or nothing tells yet which of some laws holds.
+        As much as any: nothing tells yet which of some laws holds.
     """
 
     SETTLED = 0

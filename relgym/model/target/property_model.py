@@ -254,7 +254,7 @@ class PropertyModel:
         if self._unsettled or self.fallback.lawless:
             return Standing.COARSE
         # Of laws that nothing tells apart, what does may come yet, or again.
-        if self.undecided or c.population.chancy or c.waits or self.classifier.waits or self.casting.waits:
+        if self.undecided or c.population.chancy:
             return Standing.OPEN
         return Standing.SETTLED
 

@@ -212,6 +212,18 @@ def test_what_tells_laws_apart_is_found_however_long_nothing_did() -> None:
     assert np.mean(right) >= 0.95
 
 
+def test_what_came_true_teaches_little_while_something_is_looked_for() -> None:
+    """Of many properties some wait for their turn at any time: all of them would be learned from in every step."""
+    model = WorldModel(SCHEMA)
+    for step in either(300, 1, told=True):
+        compare_and_learn(model, step, model.predict_one(step.before))
+    known = model.property_model("self", "x")
+    assert not known.waits and known.standing is Standing.SETTLED
+    for pair in known.classifier._pairs.values():
+        pair.stale = True
+    assert known.waits and known.standing is Standing.SETTLED
+
+
 def test_with_one_mode_there_is_no_choice() -> None:
     model = learned(SCHEMA, pushes(60))
     said = model.predict_one(pushes(1)[0].before)
