@@ -118,6 +118,11 @@ def check_action_space(schema: SceneSchema, space: spaces.Space[Any]) -> None:
     if ACTION not in schema.order:
         return
     properties = schema.type_of(ACTION).properties
+    if isinstance(space, (spaces.Dict, spaces.Tuple)):
+        raise ConfigError(
+            f"the schema declares its own action with the properties {properties}, but the action space {space} has "
+            "parts; leave the action out of the schema: the view makes one whose properties are the numbers of all"
+        )
     if not schema.action_scale:
         if _size(space) != len(properties):
             raise ConfigError(

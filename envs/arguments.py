@@ -187,7 +187,8 @@ def action_parts(
         The action has other parts than the space.
     """
     if isinstance(space, spaces.Tuple):
-        if not isinstance(action, (tuple, list)) or len(action) != len(space.spaces):
+        listed = isinstance(action, (tuple, list)) or (isinstance(action, np.ndarray) and action.ndim > 0)
+        if not listed or len(action) != len(space.spaces):
             raise ActionError(
                 f"expected a tuple of {len(space.spaces)} parts, one of each of {space}, got {action!r}"
             )

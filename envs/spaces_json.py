@@ -54,6 +54,12 @@ def space_to_json(space: spaces.Space[Any]) -> dict[str, Any]:
 
 def _of_parts(space: spaces.Space[Any]) -> dict[str, Any]:
     if isinstance(space, spaces.Dict):
+        keys: list[Any] = list(space.spaces)  # of any kind, whatever Gymnasium's types say
+        if wrong := [key for key in keys if not isinstance(key, str)]:
+            raise ConfigError(
+                f"a model file can hold Dict spaces whose keys are strings, got {wrong}; call the parts otherwise "
+                "inside the learner (gymnasium.wrappers.TransformObservation, TransformAction)"
+            )
         return {
             "kind": "agents" if isinstance(space, AgentsSpace) else "dict",
             "spaces": [[name, space_to_json(part)] for name, part in space.spaces.items()],

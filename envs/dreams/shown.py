@@ -342,7 +342,8 @@ class ViewDeeds:
             whose = "of several agents" if isinstance(space, AgentsSpace) else f"with actions of {space}"
             raise ConfigError(
                 f"dreams {whose} are dreamt one at a time: gym.make('relgym/LearnedModel-v0', ...), or "
-                "gym.vector.SyncVectorEnv of such"
+                "gym.vector.SyncVectorEnv of such; to search among actions, learn from an env with flat ones, which "
+                "gymnasium.wrappers.TransformAction(env, function, space) makes of yours"
             )
         self._view, self._space, self._bare = view, space, layout
 

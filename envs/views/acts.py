@@ -10,8 +10,9 @@ import numpy as np
 from gymnasium import spaces
 
 from relgym.envs.actions import without_action
+from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import action_numbers, action_parts
-from relgym.envs.views.records import identifiers
+from relgym.envs.views.records import identifier, identifiers
 from relgym.errors import ActionError, ConfigError
 from relgym.model.percepts.scenes import scene_of
 from relgym.scene.objects import ACTION, Float1D, Float2D, ObjectType, Scene, SceneLayout
@@ -33,11 +34,12 @@ class Acts:
     Parameters
     ----------
     space
-        A flat Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of those.
+        A flat Box, Discrete, MultiDiscrete or MultiBinary, or a Dict or Tuple of those (not one of agents, who are
+        objects of their own: `AgentsView`).
     names
         For a Discrete space the names of its choices (default ``a_is_0``, ``a_is_1``, …); for other spaces those
-        of an action's numbers (default ``a`` if it is one, else ``a0``, ``a1``, …; in a Dict the key in place of the
-        ``a``).
+        of an action's numbers, in the space's order (default ``a`` if it is one, else ``a0``, ``a1``, …; in a Dict the
+        key in place of the ``a``). Gymnasium sorts the keys of a Dict space.
 
     Raises
     ------
@@ -67,7 +69,7 @@ class Acts:
         self._counts = [count for _, counts in self._parts.values() for count in counts]
         discrete = isinstance(space, spaces.Discrete)
         given = self.names if self.names is not None and not discrete else self._own_names()
-        identifiers("names of an action's numbers", given, len(self._starts))
+        identifiers("actions: names of an action's numbers", given, len(self._starts))
         labels = [
             [] if not 3 <= count <= MOST_CHOICES else [f"{name}_is_{k + start:g}" for k in range(count)]
             for name, start, count in zip(given, self._starts, self._counts, strict=True)
@@ -77,6 +79,10 @@ class Acts:
             labels = [list(self.names)]
         indicators = tuple(label for part in labels for label in part)
         self.properties = (*given, *indicators)
+        if twice := sorted({name for name in self.properties if self.properties.count(name) > 1}):
+            raise ConfigError(
+                f"actions: {twice} name both a number and a choice of {space}; pass other names of its numbers"
+            )
         binary = [isinstance(part, spaces.MultiBinary) for part in _flat_parts(space).values()]
         told = [flag for flag, (starts, _) in zip(binary, self._parts.values(), strict=True) for _ in starts]
         self._flags = (*(name for name, flag in zip(given, told, strict=True) if flag), *indicators)
@@ -153,7 +159,9 @@ class Acts:
         if not isinstance(self.space, spaces.Dict):
             return _numbered("a", len(self._starts))
         return tuple(
-            name for key, (starts, _) in self._parts.items() for name in _numbered(str(key), len(starts))
+            name
+            for key, (starts, _) in self._parts.items()
+            for name in _numbered(identifier(key), len(starts))
         )
 
 
@@ -163,6 +171,12 @@ def _numbered(name: str, count: int) -> tuple[str, ...]:
 
 def _flat_parts(space: spaces.Space[Any]) -> dict[str | int | None, spaces.Space[Any]]:
     """The parts of a Dict by key, those of a Tuple by place; of another space the whole."""
+    if isinstance(space, AgentsSpace):
+        raise ConfigError(
+            f"{space} has a part for each agent: pass view=AgentsView(observation_space, action_space)"
+        )
+    if isinstance(space, (spaces.Dict, spaces.Tuple)) and not len(space.spaces):
+        raise ConfigError(f"the action space {space} has no parts: expected some numbers to act with")
     if isinstance(space, spaces.Dict):
         return {key: part for key, part in space.spaces.items()}
     return dict(enumerate(space.spaces)) if isinstance(space, spaces.Tuple) else {None: space}

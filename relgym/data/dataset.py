@@ -177,7 +177,7 @@ class Dataset:
             Before each step, shape ``(n, …)``; for a Dict space a dict of arrays, for a Tuple a tuple of them, for
             spaces without arrays (text, sequences, graphs) a list.
         actions
-            Shape ``(n, …)``.
+            Shape ``(n, …)``; of parts as `observations`.
         next_observations
             After each step, as `observations`. Default: row k + 1 follows row k, but where an episode ends; what the
             last step of each episode led to is unknown then.
@@ -424,6 +424,13 @@ class _Log:
 
 
 # ---------------------------------------------------------------------- arrays
+def _has_parts(given: tuple[Any, ...], space: spaces.Tuple[Any]) -> bool:
+    """Whether what is given is a column for each part, rather than a row for each step: arrays always are columns."""
+    if len(given) != len(space.spaces):
+        return False
+    return any([isinstance(each, np.ndarray) for each in given]) or not all([each in space for each in given])
+
+
 def _rows(given: Any, space: spaces.Space[Any], what: str) -> list[Any]:
     """Single elements of a batch of them."""
     if isinstance(space, spaces.Dict) and isinstance(given, Mapping):
@@ -434,7 +441,7 @@ def _rows(given: Any, space: spaces.Space[Any], what: str) -> list[Any]:
         columns = {key: _rows(given[key], part, f"{what}[{key!r}]") for key, part in space.spaces.items()}
         _check_lengths({key: len(column) for key, column in columns.items()}, what)
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    if isinstance(space, spaces.Tuple) and isinstance(given, tuple) and len(given) == len(space.spaces):
+    if isinstance(space, spaces.Tuple) and isinstance(given, tuple) and _has_parts(given, space):
         parts = {k: _rows(part, space.spaces[k], f"{what}[{k}]") for k, part in enumerate(given)}
         _check_lengths({k: len(column) for k, column in parts.items()}, what)
         return list(zip(*parts.values(), strict=True))
@@ -524,6 +531,12 @@ def _space_like(given: Any, what: str) -> spaces.Space[Any]:
 
 def _common(found: Sequence[spaces.Space[Any]]) -> spaces.Space[Any]:
     """One space for the actions of all episodes."""
+    first = found[0]
+    if isinstance(first, spaces.Dict) and all(
+        [getattr(s, "spaces", {}).keys() == first.keys() for s in found]
+    ):
+        by_key = [s.spaces for s in found if isinstance(s, spaces.Dict)]
+        return spaces.Dict({key: _common([parts[key] for parts in by_key]) for key in first.spaces})
     discrete = [space for space in found if isinstance(space, spaces.Discrete)]
     if len(discrete) < len(found):
         return found[0]

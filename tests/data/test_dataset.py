@@ -230,3 +230,22 @@ def test_infos_come_with_the_observations() -> None:
     assert episode.info(2) == {"k": 2, "in": {"j": 4}}
     with pytest.raises(DataError, match=re.escape("expected 6 infos, got 1")):
         Episode(X, A, infos=[{}])
+
+
+def test_rows_of_parts_are_told_from_columns() -> None:
+    pair = spaces.Tuple((spaces.Discrete(3), spaces.Discrete(3)))
+    seen = np.zeros((3, 2))
+
+    def acted(actions: Any) -> list[Any]:
+        data = Dataset.from_episodes([{"observations": seen, "actions": actions}], action_space=pair)
+        return [tuple(map(int, action)) for action in data.episodes[0].actions]
+
+    assert acted(((0, 1), (2, 0))) == [(0, 1), (2, 0)]  # two rows
+    assert acted([(0, 1), (2, 0)]) == [(0, 1), (2, 0)]
+    assert acted((np.array([0, 2]), np.array([1, 0]))) == [(0, 1), (2, 0)]  # a column for each part
+
+
+def test_choices_of_parts_are_those_of_all_episodes() -> None:
+    seen = np.zeros((3, 2))
+    given = [{"observations": seen, "actions": {"grip": np.array(grip)}} for grip in ([0, 1], [1, 2])]
+    assert Dataset.from_episodes(given).action_space == spaces.Dict({"grip": spaces.Discrete(3)})

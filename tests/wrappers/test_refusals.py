@@ -14,12 +14,15 @@ from gymnasium.wrappers import FlattenObservation, TransformAction, TransformObs
 from plain_envs import Slider
 
 from relgym.config import ModelConfig
+from relgym.envs.agents import AgentsSpace
+from relgym.envs.spaces_json import space_to_json
 from relgym.envs.views import FunctionView, NumbersView, Part, SceneView, TableView, TaskView
 from relgym.errors import ConfigError, ObservationError
+from relgym.planning import PlanningAgent
 from relgym.planning.actions import ActionCoder
 from relgym.scene.objects import ObjectType
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers import ModelLearner
+from relgym.wrappers import ModelLearner, VectorModelLearner
 from relgym.wrappers.views import readable
 
 PUSHES = Slider().action_space
@@ -109,6 +112,10 @@ def test_actions_may_have_parts(kind: Any, tmp_path: Path) -> None:
     env = ModelLearner(TransformAction(Slider(), lambda acted: acted[place], space))
     run(env, 100)
     assert env.model.seen == 100 and env.skipped == 0
+    observation, _ = env.reset(seed=1)
+    acted = made(2, np.array([0.5]))
+    (came, *_), told = env.unwrapped.step(np.array([0.5])), env.predict(observation, acted)
+    np.testing.assert_allclose(told.scene["self"].values, came)  # the law reads the part that pushes
     scene = env.view.scene(env.observation_space.sample())
     wide = np.full(PUSHES.shape, 9.0)  # outside, but an env may take it
     taken = env.view.with_action(scene, readable(space, made(2, wide)))
@@ -125,6 +132,48 @@ def test_actions_may_have_parts(kind: Any, tmp_path: Path) -> None:
         gym.make_vec("relgym/LearnedModel-v0", num_envs=2, model=tmp_path / "model.json")
     with pytest.raises(ConfigError, match="can't plan actions of"):
         ActionCoder(space)
+    with pytest.raises(ConfigError, match=r"TransformAction\(env, function, space\) inside"):
+        PlanningAgent(TransformAction(Slider(), lambda acted: acted[place], space))
+
+
+def test_of_many_envs_with_parts_each_action_is_learned_from() -> None:
+    space = spaces.Dict({"grip": spaces.Discrete(3), "push": PUSHES})
+    one = lambda: TransformAction(Slider(), lambda acted: acted["push"], space)  # noqa: E731
+    envs = VectorModelLearner(gym.vector.SyncVectorEnv([one, one]))
+    envs.reset(seed=0)
+    envs.action_space.seed(0)
+    for _ in range(30):
+        envs.step(envs.action_space.sample())
+    assert envs.model.seen == 60
+    assert envs.model.schema.type_of("action").properties[:2] == ("grip", "push")
+
+
+def test_a_tuples_action_may_be_an_array() -> None:
+    both = spaces.Tuple((spaces.Discrete(3), spaces.Discrete(2)))
+    env = learns(Seen(NUMBER, both))
+    env.step(np.array([2, 1]))
+    assert (env.model.seen, env.skipped) == (4, 0)
+
+
+def test_parts_that_cannot_be_named_are_refused_with_a_remedy() -> None:
+    two = spaces.Discrete(2)
+    spaced = learns(Seen(NUMBER, spaces.Dict({"left arm": two, "1": two})))
+    assert spaced.model.schema.type_of("action").properties == ("_1", "left_arm")
+    with pytest.raises(ConfigError, match=r"actions: \['a_is_0'\] name both"):
+        ModelLearner(Seen(NUMBER, spaces.Dict({"a": spaces.Discrete(3), "a_is_0": two})))
+    with pytest.raises(ConfigError, match="actions: names of an action's numbers: expected 3 different"):
+        ModelLearner(Seen(NUMBER, spaces.Dict({"m": spaces.MultiBinary(2), "m1": two})))
+    for none in (spaces.Dict({}), spaces.Tuple(())):
+        with pytest.raises(ConfigError, match="has no parts"):
+            ModelLearner(Seen(NUMBER, none))
+    agents = AgentsSpace({"a": two, "b": two})
+    with pytest.raises(ConfigError, match="AgentsView"):
+        NumbersView(NUMBER, agents)
+    with pytest.raises(ConfigError, match="leave the action out of the schema"):
+        FunctionView(PUSHED, lambda seen: {"body": seen}, spaces.Dict({"push": PUSHES}))
+    numbered = spaces.Dict([(0, two), (1, two)])
+    with pytest.raises(ConfigError, match=r"keys are strings, got \[0, 1\]"):
+        space_to_json(numbered)
 
 
 BODY = SceneSchema((ObjectType("body", ("x", "v")),), (("body", "body"),))

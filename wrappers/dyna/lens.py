@@ -46,8 +46,9 @@ class Lens:
     Raises
     ------
     ConfigError
-        No recorder, or outside it a wrapper that changes rewards, or a space in a way that can't be computed for
-        predicted scenes, or that depends on earlier steps (`gymnasium.wrappers.DelayObservation`).
+        No recorder; one of an env whose actions are a Dict or a Tuple; or outside it a wrapper that changes rewards,
+        or a space in a way that can't be computed for predicted scenes, or that depends on earlier steps
+        (`gymnasium.wrappers.DelayObservation`).
     """
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
@@ -65,6 +66,12 @@ class Lens:
             self._take_up(layer)
             layer = layer.env
         self.recorder = layer
+        if isinstance(layer.action_space, (spaces.Dict, spaces.Tuple)):
+            raise ConfigError(
+                f"the recorded env's actions are of {layer.action_space}, and predicted scenes take flat ones, many at "
+                "once: put gymnasium.wrappers.TransformAction(env, function, space) inside the TransitionRecorder, "
+                "where the space is flat and the function makes the env's action of one of its actions"
+            )
         self._show.reverse()
         self._view, self._base = layer.view, layer.observation_space
         self._plain = is_plain(self._view)

@@ -61,8 +61,8 @@ def test_parts_of_a_dict_are_called_as_their_keys() -> None:
         acts.values(given | {"grip": 3})
     named = Acts(ARM, ("hand", "lamp", "left", "up"))
     assert named.type.properties[:5] == ("hand", "lamp", "left", "up", "hand_is_0")
-    with pytest.raises(ConfigError, match="expected 4 different Python identifiers"):
-        Acts(spaces.Dict({"my grip": spaces.Discrete(2), "move": spaces.Box(-1.0, 1.0, (3,))}))
+    with pytest.raises(ConfigError, match="actions: names of an action's numbers: expected 4 different"):
+        Acts(ARM, ("hand", "lamp", "left"))
 
 
 def test_numbers_of_a_tuple_are_numbered_throughout() -> None:
