@@ -121,7 +121,8 @@ def check_action_space(schema: SceneSchema, space: spaces.Space[Any]) -> None:
     if isinstance(space, (spaces.Dict, spaces.Tuple)):
         raise ConfigError(
             f"the schema declares its own action with the properties {properties}, but the action space {space} has "
-            "parts; leave the action out of the schema: the view makes one whose properties are the numbers of all"
+            "parts; leave the action out of the schema of a FunctionView, which makes one of the numbers of all parts, "
+            "or flatten the actions: gymnasium.wrappers.TransformAction(env, function, space)"
         )
     if not schema.action_scale:
         if _size(space) != len(properties):

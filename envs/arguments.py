@@ -194,12 +194,8 @@ def action_parts(
             )
         return [(k, part, given) for k, (part, given) in enumerate(zip(space.spaces, action, strict=True))]
     keys = list(space.spaces)
-    few = isinstance(space, AgentsSpace)
-    if (
-        not isinstance(action, Mapping)
-        or not set(action) <= set(keys)
-        or not (few or len(action) == len(keys))
-    ):
+    known = isinstance(action, Mapping) and set(action) <= set(keys)
+    if not known or (len(action) < len(keys) and not isinstance(space, AgentsSpace)):
         raise ActionError(f"expected a dict with the keys {keys}, got {action!r}")
     return [(key, space.spaces[key], action[key]) for key in keys if key in action]
 

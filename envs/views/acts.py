@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from gymnasium import spaces
 from relgym.envs.actions import without_action
 from relgym.envs.agents import AgentsSpace
 from relgym.envs.arguments import action_numbers, action_parts
+from relgym.envs.views.arrangement import numbered
+from relgym.envs.views.leaves import Key, parts_of
 from relgym.envs.views.records import identifier, identifiers
 from relgym.errors import ActionError, ConfigError
 from relgym.model.percepts.scenes import scene_of
@@ -64,7 +67,8 @@ class Acts:
         self.space = space
         self.names = None if names is None else tuple(names)
         self._latest: tuple[SceneLayout, SceneLayout, int] | None = None  # without an action, and with one
-        self._parts = {key: _choices(part) for key, part in _flat_parts(space).items()}
+        parts = _parts(space)
+        self._parts = {key: _choices(part) for key, part in parts.items()}
         self._starts = [start for starts, _ in self._parts.values() for start in starts]
         self._counts = [count for _, counts in self._parts.values() for count in counts]
         discrete = isinstance(space, spaces.Discrete)
@@ -83,15 +87,16 @@ class Acts:
             raise ConfigError(
                 f"actions: {twice} name both a number and a choice of {space}; pass other names of its numbers"
             )
-        binary = [isinstance(part, spaces.MultiBinary) for part in _flat_parts(space).values()]
-        told = [flag for flag, (starts, _) in zip(binary, self._parts.values(), strict=True) for _ in starts]
-        self._flags = (*(name for name, flag in zip(given, told, strict=True) if flag), *indicators)
+        binary = [
+            isinstance(parts[key], spaces.MultiBinary) for key, (own, _) in self._parts.items() for _ in own
+        ]
+        self._flags = (*compress(given, binary), *indicators)
         self._indicated = [k for k, part in enumerate(labels) if part]
 
     def check(self, space: spaces.Space[Any]) -> None:
         """Raise `ConfigError` unless actions of a space mean here what they mean there."""
         try:
-            same = {key: _choices(part) for key, part in _flat_parts(space).items()} == self._parts
+            same = {key: _choices(part) for key, part in _parts(space).items()} == self._parts
         except ConfigError:
             same = False
         if not same:
@@ -157,29 +162,20 @@ class Acts:
     def _own_names(self) -> tuple[str, ...]:
         """Names of the numbers if none are given."""
         if not isinstance(self.space, spaces.Dict):
-            return _numbered("a", len(self._starts))
-        return tuple(
-            name
-            for key, (starts, _) in self._parts.items()
-            for name in _numbered(identifier(key), len(starts))
-        )
+            return numbered(len(self._starts), "a")
+        names = [numbered(len(starts), identifier(key)) for key, (starts, _) in self._parts.items()]
+        return tuple(name for own in names for name in own)
 
 
-def _numbered(name: str, count: int) -> tuple[str, ...]:
-    return (name,) if count == 1 else tuple(f"{name}{k}" for k in range(count))
-
-
-def _flat_parts(space: spaces.Space[Any]) -> dict[str | int | None, spaces.Space[Any]]:
-    """The parts of a Dict by key, those of a Tuple by place; of another space the whole."""
+def _parts(space: spaces.Space[Any]) -> dict[Key, spaces.Space[Any]]:
+    """The flat spaces that an action space is made of."""
     if isinstance(space, AgentsSpace):
         raise ConfigError(
             f"{space} has a part for each agent: pass view=AgentsView(observation_space, action_space)"
         )
-    if isinstance(space, (spaces.Dict, spaces.Tuple)) and not len(space.spaces):
-        raise ConfigError(f"the action space {space} has no parts: expected some numbers to act with")
-    if isinstance(space, spaces.Dict):
-        return {key: part for key, part in space.spaces.items()}
-    return dict(enumerate(space.spaces)) if isinstance(space, spaces.Tuple) else {None: space}
+    if found := dict(parts_of(space)):
+        return found
+    raise ConfigError(f"the action space {space} has no parts: expected some numbers to act with")
 
 
 def _choices(space: spaces.Space[Any]) -> tuple[list[float], list[int]]:

@@ -42,9 +42,9 @@ class Arrangement:
     pairs: tuple[tuple[int, int], ...]
 
 
-def numbered(count: int) -> tuple[str, ...]:
+def numbered(count: int, name: str = "x") -> tuple[str, ...]:
     """Names of an object's numbers where nobody named them: ``x`` if there is one, else ``x0``, ``x1``, …."""
-    return ("x",) if count == 1 else tuple(f"x{k}" for k in range(count))
+    return (name,) if count == 1 else tuple(f"{name}{k}" for k in range(count))
 
 
 def default_parts(names: Sequence[str], parts: Sequence[Part]) -> tuple[Part, ...]:

@@ -16,7 +16,7 @@ from relgym.envs.views.base import as_shown, cast_to
 from relgym.errors import ConfigError, ObservationError
 from relgym.scene.objects import Float1D, Float2D
 
-__all__ = ["Leaf", "Numbers"]
+__all__ = ["Leaf", "Numbers", "parts_of"]
 
 Key: TypeAlias = str | int | None
 """Where a part of an observation lies: its key in a Dict, its place in a Tuple, ``None``: the whole."""
@@ -97,7 +97,7 @@ class Numbers:
 
     def __init__(self, space: spaces.Space[Any]) -> None:
         self.space = space
-        self.leaves = tuple(Leaf(key, _flat(part, key)) for key, part in _parts(space))
+        self.leaves = tuple(Leaf(key, _flat(part, key)) for key, part in parts_of(space))
         if not self.leaves:
             raise ConfigError(
                 f"the observation space {space} has no parts: expected some numbers to learn of"
@@ -163,7 +163,8 @@ class Numbers:
             raise ObservationError(f"expected a tuple of {len(self.leaves)} parts, got {observation!r}")
 
 
-def _parts(space: spaces.Space[Any]) -> list[tuple[Key, spaces.Space[Any]]]:
+def parts_of(space: spaces.Space[Any]) -> list[tuple[Key, spaces.Space[Any]]]:
+    """The parts of a Dict by key, those of a Tuple by place; of another space the whole."""
     if isinstance(space, spaces.Dict):
         return list(space.spaces.items())
     if isinstance(space, spaces.Tuple):

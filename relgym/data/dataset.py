@@ -532,11 +532,10 @@ def _space_like(given: Any, what: str) -> spaces.Space[Any]:
 def _common(found: Sequence[spaces.Space[Any]]) -> spaces.Space[Any]:
     """One space for the actions of all episodes."""
     first = found[0]
-    if isinstance(first, spaces.Dict) and all(
-        [getattr(s, "spaces", {}).keys() == first.keys() for s in found]
-    ):
-        by_key = [s.spaces for s in found if isinstance(s, spaces.Dict)]
-        return spaces.Dict({key: _common([parts[key] for parts in by_key]) for key in first.spaces})
+    parts = [space for space in found if isinstance(space, spaces.Dict)]
+    if isinstance(first, spaces.Dict) and len(parts) == len(found):
+        if all([part.keys() == first.keys() for part in parts]):
+            return spaces.Dict({key: _common([part[key] for part in parts]) for key in first.keys()})
     discrete = [space for space in found if isinstance(space, spaces.Discrete)]
     if len(discrete) < len(found):
         return found[0]
