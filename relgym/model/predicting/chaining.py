@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +133,9 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     recent = recent[ids == ids[-1]]
     share = float((clusterer.labels[recent] != 0).mean())
     size = max((m.parameters for m in model.modes), default=math.inf)
-    if share >= NEARLY_ALL and size <= 2:
+    most = max(model.modes, key=lambda m: m.examples, default=None)
+    inert = most is not None and any(name == target.property for name, _ in most.roles[0].terms)
+    if share >= NEARLY_ALL and (size <= 2 or (inert and not look[2])):
         return None
     slots = table.signatures[int(ids[-1])]
     free = _free(parts, target)
@@ -141,8 +143,34 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     x, y = slots.matrix(table.x[clusterer.rows[recent]], order), clusterer.y[recent]
     scales = tuple(dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale)))
     config, seed = parts.config.clustering, parts.config.seed
-    task = Task(_better, x, y, slots, order, scales, share=share, size=size, config=config, seed=seed)
+    settings: dict[str, Any] = {"share": share, "size": size, "config": config, "seed": seed}
+    task = Task(_sought, x, y, slots, order, scales, inert=look[2], **settings)
     return Inquiry(look, target, task)
+
+
+@resumable
+def _sought(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    slots: SlotSignature,
+    order: NDArray[np.intp],
+    scales: tuple[Scale, ...],
+    *,
+    inert: bool,
+    **settings: Any,
+) -> Steps[_Found | None]:
+    """What is looked for; where only laws of change count and another one is better, a law without what that one reads.
+
+    Of a place, a sensor that shows it says more than its own speed does, until the sensor fails.
+    """
+    while (found := (yield from _better.steps(x, y, slots, order, scales, **settings))) is not None:
+        if found.inert >= inert:
+            return found
+        names = {(name, f"{prop}{PRIME}") for name, prop in found.given}
+        columns = [slots.at(int(c)) for c in order]
+        kept = [k for k, c in enumerate(columns) if (slots.types[c.slot].name, c.property) not in names]
+        x, order = x[:, kept], order[kept]
+    return None
 
 
 @resumable

@@ -116,3 +116,34 @@ def test_targets_come_after_what_they_are_given_and_the_task_last() -> None:
     assert in_order([reward, x, v]) == (v, x, reward)
     circle = Target("self", "v", (("self", "x"),))
     assert set(in_order([x, circle])) == {x, circle}
+
+
+def sensed(n: int, seed: int, broken: float) -> list[Transition]:
+    """A load between walls, set down anew every 100 steps, its speed, and a distance sensor that now and then fails."""
+    rng, schema = np.random.default_rng(seed), schema_of(("x", "v", "far"), ("a",))
+    steps: list[Transition] = []
+    for k, a in enumerate(rng.uniform(-0.1, 0.1, n).tolist()):
+        if k % 100 == 0:
+            x, v = float(rng.uniform(1.0, 9.0)), float(rng.uniform(-0.5, 0.5))
+            far = 10.0 - x
+        now, v = (x, v, far), v + a
+        x += v
+        if not 0.0 <= x <= 10.0:
+            x, v = (-x if x < 0.0 else 20.0 - x), -v
+        far = -99.0 if rng.random() < broken else 10.0 - x
+        before = {"self": now, "action": (a,)}
+        steps.append(Transition(schema.scene(before), schema.scene(before | {"self": (x, v, far)})))
+    return steps
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_place_doesnt_follow_from_the_sensor_that_shows_it(seed: int) -> None:
+    """It would be the shortest law of most steps, and as often wrong as the sensor fails."""
+    steps = sensed(1_500, seed, 0.03)
+    model = learned(steps[0].before.schema, steps)
+    place = next(target for target in model.targets if target.property == "x")
+    assert ("self", "far") not in place.given
+    fresh = sensed(300, 50 + seed, 0.03)
+    said = [model.predict_one(step.before)["self", "x"] for step in fresh]
+    right = [p.ok and abs(p.value - s.after["self"]["x"]) < 1e-9 for p, s in zip(said, fresh, strict=True)]
+    assert np.mean(right) > 0.98
