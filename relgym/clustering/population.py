@@ -114,17 +114,26 @@ class Population:
         """All modes but noise, by id."""
         if not len(self.log):
             return tuple(c.mode for _, c in sorted(self.clusters.items()))
-        counts = {i: int(np.count_nonzero(self.labels == i)) + self.log.forgotten[i] for i in self.clusters}
-        for i, more in self._stood_for(counts).items():
-            counts[i] += more
+        counts = self._counts()
         return tuple(c.mode.with_examples(counts[i]) for i, c in sorted(self.clusters.items()))
 
-    def _stood_for(self, counts: Mapping[int, int]) -> dict[int, int]:
-        """How many examples those of each mode stand for beside themselves.
+    def _counts(self) -> dict[int, int]:
+        """Examples of each mode and of none (`NOISE`), with those that they stand for."""
+        counts = {
+            i: int(np.count_nonzero(self.labels == i)) + self.log.forgotten[i]
+            for i in (NOISE, *self.clusters)
+        }
+        return {
+            i: count + more
+            for (i, count), more in zip(counts.items(), self._stood_for(counts).values(), strict=True)
+        }
 
-        Of what nobody stands for, yet or any more, each mode has as large a share as of the others.
+    def _stood_for(self, counts: Mapping[int, int]) -> dict[int, int]:
+        """How many examples those of each mode, and of none, stand for beside themselves.
+
+        Of what nobody stands for, yet or any more, each has as large a share as of the others.
         """
-        found = {i: self.log.passed[i] for i in self.clusters}
+        found = {i: self.log.passed[i] if i != NOISE else 0 for i in counts}
         left, total = self.log.passed[NOISE], sum(counts.values())
         if left and total:
             for i in sorted(counts):
@@ -132,6 +141,11 @@ class Population:
             most = max(sorted(counts), key=lambda i: counts[i])
             found[most] += self.log.passed.total() - sum(found.values())
         return found
+
+    @property
+    def unexplained(self) -> int:
+        """Number of steps that no mode explains, those included that `noise_examples` stand for."""
+        return self._counts()[NOISE] if len(self.log) else self.known_noise
 
     @property
     def noise_examples(self) -> int:

@@ -30,7 +30,7 @@ _NOTHING = re.compile(r"No targets yet: nothing changed in ([\d,]+) transitions?
 _SCOPE = re.compile(r"Scenes held (.*); other numbers of objects were never seen\.")
 _COUNT = re.compile(r"(\S+) × (\d+)(?: to (\d+))?")
 _TARGET = re.compile(r"(?P<type>[^\s.]+)\.(?P<property>\S+)'  \((?P<steps>[\d,]+) steps?\)")
-_STEPS = re.compile(r"([\d,]+) steps?")
+_STEPS = re.compile(r"([\d,]+) steps?(?:, ([\d,]+) right)?")
 _UNEXPLAINED = re.compile(r"([\d,]+) of these steps \(.*\) follow none of these functions")
 _PLACE = re.compile(r"number (\d+) of the other objects of type (.+)")
 _BOUND = re.compile(r"then (at least|at most) (\S+?)(?:  \(([\d,]+) steps?\))?")
@@ -226,9 +226,8 @@ def _branch(draft: _Draft, head: str, fields: list[str]) -> None:
     condition = re.sub(r"^(if|elif) |^(else|always)$", "", head[:-1])
     numbers = [match for stat in stats if (match := _STEPS.fullmatch(stat))]
     spreads = [number_of(stat[2:]) for stat in stats if stat.startswith("± ")]
-    branch = Branch(
-        (), None, steps=whole_of(numbers[0][1]) if numbers else 0, spread=spreads[0] if spreads else 0.0
-    )
+    steps, right = (whole_of(each or numbers[0][1]) for each in numbers[0].groups()) if numbers else (0, 0)
+    branch = Branch((), None, steps=steps, wrong=steps - right, spread=spreads[0] if spreads else 0.0)
     if said.startswith("no prediction"):
         branch = replace(branch, reason=said.removeprefix("no prediction").strip(" ()"))
     else:

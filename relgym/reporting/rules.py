@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.config.constants import LEFT_OPEN
 from relgym.errors import ConfigError
 from relgym.reporting.conditions import CONTEXTS, Condition, condition_text
 from relgym.reporting.evaluation import evaluate
@@ -70,6 +71,8 @@ class Branch:
         Why there is no prediction.
     steps
         Training steps that go by it.
+    wrong
+        Of how many of them it isn't right, in the end: where nothing tells yet what follows, of most.
     spread
         Standard deviation of what it leaves, in units of the property; 0 where that is rounding.
     """
@@ -79,6 +82,7 @@ class Branch:
     name: str = ""
     reason: str = ""
     steps: int = 0
+    wrong: int = 0
     spread: float = 0.0
 
     @property
@@ -273,6 +277,7 @@ class PropertyRules:
                     "value": None if branch.function is None else branch.function.text(digits),
                     "reason": branch.reason,
                     "steps": branch.steps,
+                    "wrong": branch.wrong,
                     "spread": branch.spread,
                 }
                 for branch in self.branches
@@ -451,6 +456,8 @@ class RuleList:
             lines.append(
                 "Branches are tried in order; steps: training steps that go by it; ±: what it leaves there."
             )
+        if any(_often_wrong(branch) for p in self.properties for branch in p.branches):
+            lines.append("right: of so many of these steps; where nothing stands, of nearly all.")
         return "\n".join(f"# {line}" for line in lines)
 
 
@@ -480,9 +487,14 @@ def scope_text(scope: Iterable[tuple[str, int, int]]) -> str:
     return f"Scenes held {', '.join(told)}; other numbers of objects were never seen."
 
 
-def steps_text(steps: int, spread: float) -> tuple[str, str]:
-    """Number of steps and spread, as columns."""
-    return _steps(steps), f"± {spread:.2g}"
+def _often_wrong(branch: Branch) -> bool:
+    return branch.function is not None and branch.wrong > LEFT_OPEN * branch.steps
+
+
+def steps_text(branch: Branch) -> tuple[str, str]:
+    """Number of steps and spread, as columns; and of how many it is right, unless that is nearly all of them."""
+    right = f", {branch.steps - branch.wrong:,} right" if _often_wrong(branch) else ""
+    return f"{_steps(branch.steps)}{right}", f"± {branch.spread:.2g}"
 
 
 def _steps(steps: int) -> str:
@@ -504,7 +516,7 @@ def _branch_lines(rules: PropertyRules, digits: int) -> list[str]:
             said = f"no prediction ({branch.reason})" if branch.reason else "no prediction"
         else:
             said = f"{rules.property}' = {branch.function.text(digits)}"
-        stats = "  ".join(steps_text(branch.steps, branch.spread)) if branch.function is not None else ""
+        stats = "  ".join(steps_text(branch)) if branch.function is not None else ""
         rows.append((head, said, stats))
     heads = [len(head) for head, _, _ in rows if len(head) <= 40]
     margin = max(heads, default=0) + 2

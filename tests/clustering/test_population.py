@@ -221,3 +221,16 @@ def test_what_changes_the_set_of_modes() -> None:
     assert ClusterReport(1, (1,), created=(3,)).changed
     assert ClusterReport(1, (1,), removed=(3,)).changed
     assert ClusterReport(1, (1,), reassigned=True).changed
+
+
+def test_what_nobody_explains_stands_for_others_too() -> None:
+    population, _ = made(
+        [(1.0, 0.0)] * 8, [2.0] * 8, DOUBLE, labels=[1, 1, NOISE, NOISE, NOISE, NOISE, NOISE, NOISE]
+    )
+    population.log.passed[NOISE] = 40
+    assert population.noise_examples == 6  # those there are
+    assert population.unexplained == 36
+    assert [mode.examples for mode in population.modes] == [12]
+    population.log.passed[1] = 4  # of which it is known what they follow
+    assert population.unexplained == 36
+    assert [mode.examples for mode in population.modes] == [16]

@@ -156,7 +156,7 @@ def _target_report(part: PropertyModel, digits: int, advice: Advice | None) -> T
     return TargetReport(
         str(part.target),
         part.target.type,
-        part.clusterer.noise_examples,
+        part.clusterer.population.unexplained,
         modes,
         pairs,
         _role_rows(part),

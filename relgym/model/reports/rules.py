@@ -192,7 +192,8 @@ def _property(part: PropertyModel) -> PropertyRules:
     if part.classifier.modes:
         functions, roles = functions_of(part)
         branches = _within(part, _branches(part, functions))
-    steps = part.clusterer.noise_examples + sum(mode.examples for mode in part.modes)
+    unexplained = part.clusterer.population.unexplained
+    steps = unexplained + sum(mode.examples for mode in part.modes)
     return PropertyRules(
         target.type,
         target.property,
@@ -200,7 +201,7 @@ def _property(part: PropertyModel) -> PropertyRules:
         tuple(_bounds(part)),
         roles,
         steps,
-        part.clusterer.noise_examples,
+        unexplained,
         experience=_experience(part),
         ended=tuple(mode.formula() for mode in part.modes if mode.id in part.past),
     )
@@ -356,12 +357,26 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
     ]
     nobody = part.classifier.exemplars.assigned == UNKNOWN
     rules = decision_list(truth, allowed, weights, cost, doubtful=nobody, budget=DOUBT)
+    right = part.classifier.exemplars.columns["fits"]
+    # Examples stand for others in whole numbers, which add up to a few steps more or less than there were.
+    total = part.clusterer.population.unexplained + sum(
+        mode.examples for mode in part.modes if mode.id not in part.past
+    )
+    times = total / max(float(weights.sum()), 1.0)
     found: list[Branch] = []
+    left = np.ones(len(view), dtype=np.bool_)  # for later branches
     for rule in rules:
-        branch = _of_rule(part, rule, atoms, modes, functions)
+        there = left & np.all([truth[:, k] == yes for k, yes in rule.tests] or [left], axis=0)
+        left &= ~there
+        wrong = round(times * float(weights[there & ~right[:, rule.label]].sum()))
+        branch = _of_rule(part, rule, atoms, modes, functions, steps=round(times * rule.weight), wrong=wrong)
         if found and branch.cases and found[-1].function == branch.function:
+            last = found[-1]
             found[-1] = replace(
-                found[-1], cases=(*found[-1].cases, *branch.cases), steps=found[-1].steps + branch.steps
+                last,
+                cases=(*last.cases, *branch.cases),
+                steps=last.steps + branch.steps,
+                wrong=last.wrong + branch.wrong,
             )
         else:
             found.append(branch)
@@ -369,10 +384,18 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
 
 
 def _of_rule(
-    part: PropertyModel, rule: Rule, atoms: Sequence[_Atom], modes: Sequence[int], functions: dict[int, Sum]
+    part: PropertyModel,
+    rule: Rule,
+    atoms: Sequence[_Atom],
+    modes: Sequence[int],
+    functions: dict[int, Sum],
+    *,
+    steps: int,
+    wrong: int,
 ) -> Branch:
     tests = [atoms[k].test if yes else atoms[k].test.opposite for k, yes in rule.tests]
-    return _branch(part, tuple(dict.fromkeys(tests)), modes[rule.label], functions, round(rule.weight))
+    found = _branch(part, tuple(dict.fromkeys(tests)), modes[rule.label], functions, steps)
+    return replace(found, wrong=wrong)
 
 
 def _branch(
