@@ -202,6 +202,11 @@ def rules(
     from relgym.wrappers.follower import scenes_of
 
     if not check:
+        given = {"--env": env_id, "--arg": arg, "--view": view}
+        if needless := [name for name, value in given.items() if value]:
+            raise ConfigError(
+                f"{', '.join(needless)}: rules are those of the file; give --check, too, or leave it out"
+            )
         found, fresh = loaded(model), None
     else:
         subject = opened(model, env_id, pairs("--arg", arg), view)
@@ -389,7 +394,9 @@ def benchmark(
     from relgym.experiments.benchmark import main
     from relgym.experiments.suites import listing, suite
 
-    if not name:
+    if asked := name in ("--help", "-h"):
+        typer.echo(rest.get_help())
+    if asked or not name:
         typer.echo(_columns(listing()))
         return
     main(suite(name), rest.args)

@@ -101,6 +101,12 @@ def test_export_writes_python_and_compares(folder: Path, tmp_path: Path) -> None
     assert "expected 'python'" in run("export", folder / "ball.json", file, "--to", "c", code=2)
 
 
+def test_help_on_benchmarks_lists_them() -> None:
+    told = run("benchmark", "--help")
+    assert "Usage: relgym benchmark" in told and "Other people's envs" in told
+    assert run("benchmark").rstrip() in told
+
+
 def test_rules_print_a_model(folder: Path) -> None:
     model = WorldModel.load(folder / "ball.json")
     assert run("rules", folder / "ball.json").rstrip("\n") == model.describe()

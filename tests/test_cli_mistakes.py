@@ -146,6 +146,7 @@ MISTAKES = {
     "reproduce --workers many": ["'--workers'"],
     "dyna --step 3": ["no option --step", "did you mean '--steps'?"],
     "plan --word x": ["relgym plan has no option --word", "--episodes"],
+    "rules slider.json --env CartPole-v1": ["--env", "give --check, too"],
     "benchmark nothing": ["benchmark 'nothing': expected one of laws"],
     "doctor extra": ["relgym doctor", "(extra)"],
     "envs --al": ["no option --al", "did you mean '--all'?"],

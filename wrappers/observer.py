@@ -21,7 +21,7 @@ from relgym.model.predicting.prequential import StepReport
 from relgym.model.protocol import SceneLearner
 from relgym.scene.objects import Scene
 from relgym.wrappers.follower import BadObservations, Follower, Look
-from relgym.wrappers.settings import PlainTarget, check_model, model_of, target_of
+from relgym.wrappers.settings import PlainTarget, check_model, model_of, targets_of
 from relgym.wrappers.study import NOTHING, Study
 from relgym.wrappers.views import is_open, remembered, settled, upheld
 
@@ -103,7 +103,7 @@ class Observer:
         bad_observations: BadObservations = "raise",
         metadata: Mapping[str, Any] | None = None,
     ) -> None:
-        self._targets = None if targets is None else [target_of(t) for t in targets]
+        self._targets = targets_of(targets)
         self._config = None if config is None else ModelConfig.of(config)
         check_model(model)
         self._given = model

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -16,10 +16,17 @@ from relgym.model.world_model import WorldModel
 from relgym.scene.objects import TASK, Target
 from relgym.scene.schema import SceneSchema
 
-__all__ = ["PlainTarget", "check_model", "model_of", "target_of"]
+__all__ = ["PlainTarget", "check_model", "model_of", "targets_of"]
 
 PlainTarget: TypeAlias = Target | str | Sequence[Any]
 """A target, its name (``"ball.vx"``), or ``(type, property)``."""
+
+
+def targets_of(given: Iterable[PlainTarget] | None) -> list[Target] | None:
+    """The targets that are meant; `ConfigError` where some are none."""
+    if isinstance(given, str):
+        raise ConfigError(f"targets={given!r}: expected several, such as [{given!r}]")
+    return None if given is None else [target_of(t) for t in given]
 
 
 def target_of(given: PlainTarget) -> Target:

@@ -22,7 +22,7 @@ from relgym.scene.objects import TASK, Transition
 from relgym.wrappers.follower import BadObservations, Follower
 from relgym.wrappers.learning import Learning
 from relgym.wrappers.observer import Observer, Step
-from relgym.wrappers.settings import PlainTarget, target_of
+from relgym.wrappers.settings import PlainTarget, targets_of
 from relgym.wrappers.views import ViewLike, chosen_view, readable
 
 __all__ = ["DataLearner", "fit", "progressive", "score"]
@@ -313,9 +313,7 @@ def _of_transitions(
 ) -> WorldModel:
     if model is None:
         schema = getattr(transitions[0], "transition", transitions[0]).before.schema
-        return WorldModel(
-            schema, config, targets=None if targets is None else [target_of(t) for t in targets]
-        )
+        return WorldModel(schema, config, targets=targets_of(targets))
     if targets is not None or config is not None:
         raise ConfigError("a model keeps its targets and config: pass either model or those")
     return model if isinstance(model, WorldModel) else WorldModel.load(model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from time import perf_counter
 from typing import Any, Final, TypeAlias, cast
@@ -318,16 +318,22 @@ class Planner:
                 None if not isinstance(observation, np.ndarray) or observation.ndim < 2 else len(observation)
             )
         space: Any = self.simulator.observation_space
-        own = next(iter(space.spaces.values())) if hasattr(space, "spaces") else space
         one: Any = observation
-        if isinstance(observation, dict):
-            one = next(iter(observation.values()), None)
-        if not isinstance(one, np.ndarray) or one.ndim != len(own.shape or ()) + 1:
+        while isinstance(parts := getattr(space, "spaces", None), Mapping | Sequence) and parts:
+            name = (
+                next(iter(parts)) if isinstance(parts, Mapping) else 0
+            )  # what tells of one part tells of all
+            if not isinstance(one, Mapping | tuple) or (isinstance(one, Mapping) and name not in one):
+                return None
+            space, one = parts[name], one[name]
+        if not isinstance(one, np.ndarray) or one.ndim != len(space.shape or ()) + 1:
             return None
         return len(one)
 
 
 def _picked(observation: Any, k: int) -> Any:
-    if isinstance(observation, dict):
-        return {name: part[k] for name, part in observation.items()}
+    if isinstance(observation, Mapping):
+        return {name: _picked(part, k) for name, part in observation.items()}
+    if isinstance(observation, tuple):
+        return tuple(_picked(part, k) for part in observation)
     return observation[k]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gymnasium import spaces
 from numpy.typing import NDArray
 from simulated import Line
 
@@ -108,6 +109,32 @@ def test_batches_are_planned_one_by_one_and_forgotten_where_episodes_begin() -> 
     _, later = planner.predict(seen, state, np.array([True, False]))
     assert later[0] is not state[0] and later[1] is state[1]
     assert later[0].searches == 1
+
+
+@dataclass
+class Parted(Line):
+    """A line that is shown in parts, of which only one counts."""
+
+    def state(self, observation: Any) -> NDArray[np.float64]:
+        part = observation[0] if isinstance(observation, tuple) else observation["place"]["x"]
+        return np.asarray(part, dtype=np.float64)
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_observations_in_parts_are_told_from_batches_of_them(named: bool) -> None:
+    x, lamp = spaces.Box(-10.0, 10.0, (1,), np.float64), spaces.Discrete(2)
+    space = spaces.Dict({"lamp": lamp, "place": spaces.Dict({"x": x})}) if named else spaces.Tuple((x, lamp))
+    planner = Planner(Parted(observation_space=space), SEARCH)
+
+    def shown(place: Any, lamp: Any) -> Any:
+        return (
+            {"place": {"x": place}, "lamp": lamp} if named else (place, lamp)
+        )  # in another order than the space's
+
+    action, _ = planner.predict(shown(np.array([0.0]), np.int64(1)))
+    assert action.shape == (1,) and action[0] > 0.0
+    actions, _ = planner.predict(shown(np.array([[0.0], [6.0]]), np.array([1, 0])))
+    assert actions.shape == (2, 1) and actions[0, 0] > 0.0 > actions[1, 0]
 
 
 def test_an_agents_observation_may_be_another_than_the_models() -> None:

@@ -12,7 +12,7 @@ from relgym.errors import ConfigError
 from relgym.model.world_model import WorldModel
 from relgym.scene.objects import ACTION, TASK, ObjectType, Target
 from relgym.scene.schema import SceneSchema
-from relgym.wrappers.settings import check_model, model_of, target_of
+from relgym.wrappers.settings import check_model, model_of, target_of, targets_of
 
 CART, PUSH = ObjectType("cart", ("x", "v")), ObjectType(ACTION, ("push",))
 SCHEMA = SceneSchema((CART, PUSH), (("cart", "cart"), (ACTION, ACTION)), targets=(Target("cart", "v"),))
@@ -37,6 +37,13 @@ def test_ways_to_name_a_target(given: Any, target: Target) -> None:
 def test_what_names_no_target(given: Any) -> None:
     with pytest.raises(ConfigError, match=r"expected 'ball.vx', \('ball', 'vx'\) or a Target"):
         target_of(given)
+
+
+def test_one_name_isnt_several() -> None:
+    with pytest.raises(ConfigError, match=r"targets='cart.v': expected several, such as \['cart.v'\]"):
+        targets_of("cart.v")
+    assert targets_of(["cart.v"]) == [Target("cart", "v")]
+    assert targets_of(None) is None
 
 
 def test_a_new_model_has_the_config_and_targets_that_were_given() -> None:

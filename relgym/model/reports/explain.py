@@ -326,7 +326,12 @@ class _Seen:
 
 
 def _word(told: PropertyRules, branch: Branch) -> str:
-    """What happens where a branch holds; empty where its function has no word that isn't another one's name."""
+    """What happens where a branch holds; empty where its function has no word that isn't another one's name.
+
+    And of what always holds, which rules don't name either.
+    """
+    if not branch.cases and len(told.branches) == 1:
+        return ""
     if branch.name or branch.function is None:
         return branch.name
     word = word_for(branch.function, told.property)

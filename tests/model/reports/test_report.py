@@ -86,9 +86,7 @@ def test_one_mode_word_for_word() -> None:
 
 def test_the_only_mode_has_no_runner_up() -> None:
     assert halving().explain(SCHEMA.scene({"b": [3.0]})) == (
-        "b.v: 3 -> 1.5\n"
-        "  rule      changing: v' = 0.5 v  (12 training steps)\n"
-        "  because   no other rule is known"
+        "b.v: 3 -> 1.5\n  rule      v' = 0.5 v  (12 training steps)\n  because   no other rule is known"
     )
 
 
