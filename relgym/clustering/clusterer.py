@@ -16,10 +16,10 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.last_resort import Resort, timely
 from relgym.clustering.mode import NOISE, Mode, Role
 from relgym.clustering.mode_search import ModeSearch
-from relgym.clustering.noise import estimate_noise, refuted, rounding_noise
+from relgym.clustering.noise import coded_by_a_law, estimate_noise, refuted, rounding_noise
 from relgym.clustering.population import ClusterReport, Population
 from relgym.config import ClusteringConfig
-from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, SEARCHED_CELLS, SELDOM
+from relgym.config.constants import ALIKE, FEWEST, FIRST, OFTEN, RECENT, ROUGH, SEARCHED_CELLS, SELDOM
 from relgym.scene.objects import Target
 from relgym.scheduling.agenda import Budget
 from relgym.scheduling.renewal import due
@@ -47,6 +47,8 @@ class ModeClusterer:
         The search for further modes among them.
     floor
         Rounding noise, the least that is possible, in units of the target.
+    reach
+        The largest magnitude that the target ever had; 0 before the first.
     due
         Whether an approximation is to be sought at the next opportunity, once the one under way, if any, is found.
 
@@ -61,13 +63,13 @@ class ModeClusterer:
         self.population = Population(target, config)
         self.search = ModeSearch(self.population, seed=seed)
         self.floor = float(np.finfo(np.float64).eps)
+        self.reach = 0.0
         self.due = False
         self._resort: Resort | None = None  # the search for an approximation, under way
         self._sought = 0  # after so many examples the latest one began
         self._anew = False  # other next values are given since the latest one: laws are searched for first
         self._estimating = False  # whether the noise is to be estimated anew
         self._largest = 0.0  # number among the columns and the target's values
-        self._reach = 0.0  # value of the target
         self._spread = 0.0  # noise found in the data, rounding apart
 
     # ------------------------------------------------------------------ what it knows
@@ -223,8 +225,8 @@ class ModeClusterer:
         largest = max(float(np.abs(table.x[row, :core]).max(initial=0.0)), abs(y))
         # Of many targets not all estimate in the same step.
         estimating = self._estimating and budget.left > 0
-        if largest > self._largest or abs(y) > self._reach or estimating:
-            self._largest, self._reach = max(largest, self._largest), max(abs(y), self._reach)
+        if largest > self._largest or abs(y) > self.reach or estimating:
+            self._largest, self.reach = max(largest, self._largest), max(abs(y), self.reach)
             self._rescale(table, budget, estimating=estimating)
         return example
 
@@ -271,13 +273,21 @@ class ModeClusterer:
         slots = table.signatures[table.signature_ids[recent[-1]]]
         own = table.x[recent][:, : slots.core]
         observed = np.delete(own, [k for k in slots.actions if k < slots.core], axis=1)
-        floor = rounding_noise(own, np.append(self.y[-256:], self._reach), observed)
+        latest = self.y[-256:]
+        changes = latest - slots.present_of(table.x, recent, self.target)
+        floor = rounding_noise(own, np.append(latest, self.reach), observed, changes=changes)
         self.floor = floor
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:
             budget.spend(2 * SEARCHED_CELLS)  # two kinds of functions: each takes a look at as many numbers
-            estimate = self._estimate(table, floor)
-            if estimate is not None and self._refutes(estimate):
+            part, x, own = self._unclear(table)
+            strata = table.strata[self.rows[part]]
+            estimate = estimate_noise(x, self.y[part], strata, floor=floor, own=own)
+            if (
+                estimate is not None
+                and self._refutes(estimate)
+                and not self._lawful(part, x[:, :own], estimate)
+            ):
                 self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
         self._assume(max(floor, self._spread))
@@ -297,25 +307,45 @@ class ModeClusterer:
         self.population.scale = replace(self.scale, sigma=sigma, misfit=self.approximate)
 
     def _review(self, table: ExampleTable) -> bool:
-        """The same with the noise that the modes known so far leave, which tells more than a first estimate did."""
-        if self.population.chancy and self.config.noise_std == "auto":
+        """The same with the noise that the modes known so far leave, which tells more than a first estimate did.
+
+        Where only rounding was assumed, they leave more than that if less of it is now: columns have been seen to vary.
+        """
+        rounding = self._spread <= self.floor and not self.approximate
+        if (self.population.chancy or rounding) and self.config.noise_std == "auto":
             left = self.population.residual_spread(table)
-            if left > self.floor:
+            if left > self.floor * (1.0 if self.population.chancy else ROUGH):
                 self._spread = left
                 self._assume(left)
+                if rounding:  # what no mode explained for want of tolerance
+                    self.population.reassign_all(table)
         return self.search.review(table)
 
-    def _estimate(self, table: ExampleTable, floor: float) -> float | None:
-        """Noise among examples of the signature that holds most of the unexplained ones; none: they can't tell."""
+    def _unclear(self, table: ExampleTable) -> tuple[NDArray[np.intp], NDArray[np.float64], int]:
+        """Examples of the signature that holds most of the unexplained ones, their columns, and how many are own."""
         ids = table.signature_ids[self.rows]
         most = int(np.bincount(ids[self.labels == NOISE], minlength=1).argmax())
         part = np.flatnonzero(ids == most)
         slots = table.signatures[most]
         order, stages = slots.preference(self.target)
         order = order[order < len(slots.columns)]
-        rows = self.rows[part]
-        return estimate_noise(
-            table.x[rows][:, order], self.y[part], table.strata[rows], floor=floor, own=stages[0]
+        return part, table.x[self.rows[part]][:, order], stages[0]
+
+    def _lawful(self, part: NDArray[np.intp], x: NDArray[np.float64], estimate: float) -> bool:
+        """Whether a law that too few obey yet says more of the first examples than so much noise does."""
+        if len(self.y) >= RECENT or estimate <= self.scale.sigma:
+            return False
+        left = self.labels[part] == NOISE
+        rng = np.random.default_rng(len(self.y))
+        scale = self.scale
+        return coded_by_a_law(
+            x[left],
+            self.y[part[left]],
+            scale.sigma,
+            scale.tolerance,
+            estimate,
+            draws=self.config.draws,
+            rng=rng,
         )
 
     def _start_over(self) -> None:
@@ -391,7 +421,7 @@ class ModeClusterer:
         first = len(self.population.log)
         for row, y in zip(rows.tolist(), other.y.tolist(), strict=True):
             self.population.log.append(row, y)
-        self._largest, self._reach = max(self._largest, other._largest), max(self._reach, other._reach)
+        self._largest, self.reach = max(self._largest, other._largest), max(self.reach, other.reach)
         self._spread, self.floor = max(self._spread, other._spread), max(self.floor, other.floor)
         self.population.approximate |= other.approximate
         self._assume(max(self.scale.sigma, other.scale.sigma))
@@ -422,7 +452,7 @@ class ModeClusterer:
             "sigma": self.scale.sigma,
             "next_id": self.population.next_id,
             "largest": self._largest,
-            "reach": self._reach,
+            "reach": self.reach,
             "spread": self._spread,
             "rounding": self.floor,
             "approximate": self.approximate,
@@ -443,7 +473,7 @@ class ModeClusterer:
     def restore(self, data: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
         """Take over what `to_json` and `to_arrays` wrote; without arrays there are no examples."""
         self.population.next_id = int(data["next_id"])
-        self._largest, self._reach = float(data["largest"]), float(data["reach"])
+        self._largest, self.reach = float(data["largest"]), float(data["reach"])
         self.population.approximate, self.due = bool(data["approximate"]), bool(data.get("due", False))
         self.population.chancy = bool(data.get("chancy", False))
         self._estimating = bool(data.get("estimating", False))

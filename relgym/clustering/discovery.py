@@ -54,6 +54,7 @@ from relgym.numeric.stepwise import (
     forward_stepwise,
     least_squares,
     varying_columns,
+    with_unit,
 )
 from relgym.scheduling.work import Steps, resumable
 
@@ -263,6 +264,7 @@ def simplest(
     scale
         Noise and tolerances.
     """
+    found = _counting_from(x, y, found, present, scale)
     stays = np.abs(y - x[:, present]) <= scale.tolerance
     both, bits = stays & found.inliers, verifying_bits(y, scale)
     left = np.square(y[both] - found.fit.predict(x[both])) - np.square(y[both] - x[both, present])
@@ -272,6 +274,26 @@ def simplest(
     if saved > 0.0 or (saved == 0.0 and numbers):
         return Consensus(LinearFit((present,), (1.0,), 0.0, 0.0), stays)
     return found
+
+
+def _counting_from(
+    x: NDArray[np.float64], y: NDArray[np.float64], found: Consensus, present: int, scale: Scale
+) -> Consensus:
+    """A function whose weight of the present value is 1 but for rounding, with a weight of 1 if it explains as much.
+
+    What the weight is off by stands for something that isn't said: of a clock that is far from 0, what a step takes.
+    """
+    weights = dict(zip(found.fit.columns, found.fit.weights, strict=True))
+    if not 0.0 < abs(weights.pop(present, 1.0) - 1.0) <= ROUNDED:
+        return found
+    rows = found.inliers
+    others = tuple(c - (c > present) for c in weights)
+    fit = least_squares(np.delete(x[rows], present, axis=1), y[rows] - x[rows, present], others)
+    if fit.terms > found.fit.terms:
+        return found
+    fit = with_unit(fit, present)
+    explained = np.abs(y - fit.predict(x)) <= scale.tolerance
+    return Consensus(fit, explained) if explained.sum() >= found.size else found
 
 
 def _law_of(
@@ -469,9 +491,17 @@ def identified(
         weak, kept = yield from _unsupported(x[rows], found.fit, scale, support)
         if weak is None:
             part = rows[_commonest(x[rows], found.fit)]
-            if not len(part):
-                return found if _enough_combinations(x[rows], y[rows], found.fit, scale.tolerance) else None
-            fit = least_squares(x[part], y[part], ())
+            if len(part):
+                fit = least_squares(x[part], y[part], ())
+                continue
+            few = _unverified(x[rows], y[rows], found.fit, scale.tolerance)
+            if not few:
+                return None if _tabulated(x[rows], y[rows], found.fit, scale.tolerance) else found
+            part = rows[_mostly(x[rows][:, few])]
+            if len(part) <= MAJORITY * len(y):
+                return None
+            others = tuple(c for c in found.fit.columns if c not in few)
+            fit = least_squares(x[part], y[part], others)
             continue
         columns = tuple(c for c in found.fit.columns if c != weak)
         fit = least_squares(x[rows[kept]], y[rows[kept]], columns)
@@ -558,27 +588,44 @@ def verifying_combinations(weights: int, combinations: int, columns: int, told: 
     return max(1, math.ceil(ways / math.log2(max(told, 2.0))))
 
 
-def _enough_combinations(
-    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
-) -> bool:
-    """Whether slowly changing columns take enough combinations of values to support their weights."""
-    if _persists(fit):
-        return True
+def _mostly(x: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows of the commonest combination of values."""
+    _, which, counts = np.unique(x, axis=0, return_inverse=True, return_counts=True)
+    return np.flatnonzero(which.reshape(-1) == counts.argmax())
+
+
+def _few_valued(x: NDArray[np.float64], fit: LinearFit) -> tuple[list[int], list[int]]:
+    """Columns of a function that take few values: those that change often, and those that don't."""
     few = [c for c in fit.columns if len(np.unique(x[:, c])) <= len(x) // SCENE_ROWS]
     lively = [c for c in few if _lively(x[:, c])]
+    return lively, [c for c in few if c not in lively]
+
+
+def _unverified(
+    x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float
+) -> list[int]:
+    """Columns that take too few combinations of values to support their weights; none where all are supported."""
+    if _persists(fit):
+        return []
+    lively, slow = _few_valued(x, fit)
     if len(lively) > 1 and len(np.unique(x[:, lively], axis=0)) < len(lively) + 2:
-        return False
-    slow = [c for c in few if c not in lively]
+        return lively
     if not slow:
-        return True
+        return []
     combinations = len(np.unique(x[:, slow], axis=0))
     weight = dict(zip(fit.columns, fit.weights, strict=True))
     part = sum(weight[c] * x[:, c] for c in slow)
     # If every combination contributes another value, each verifies them that weights and a constant don't use up.
     verified = len(np.unique(np.round(part / (TOLD * tolerance))))
     spare = verifying_combinations(len(slow), combinations, x.shape[1], float(np.ptp(y)) / tolerance)
-    if combinations < 2 * len(slow) + 2 and verified < len(slow) + 1 + spare:
+    return slow if combinations < 2 * len(slow) + 2 and verified < len(slow) + 1 + spare else []
+
+
+def _tabulated(x: NDArray[np.float64], y: NDArray[np.float64], fit: LinearFit, tolerance: float) -> bool:
+    """Whether a function of slowly changing columns alone has hardly more values than numbers."""
+    if _persists(fit) or not fit.columns:
         return False
-    if len(slow) == len(fit.columns) and np.ptp(y) > tolerance:
-        return len(np.unique(np.round(y / tolerance))) >= 2 * fit.terms
-    return True
+    _, slow = _few_valued(x, fit)
+    if len(slow) < len(fit.columns) or np.ptp(y) <= tolerance:
+        return False
+    return len(np.unique(np.round(y / tolerance))) < 2 * fit.terms

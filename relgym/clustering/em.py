@@ -20,7 +20,7 @@ from relgym.clustering.examples import ExampleTable
 from relgym.clustering.mode import Mode
 from relgym.clustering.roles import Binding, bind
 from relgym.config.constants import FEWEST, MOST_ROWS
-from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares
+from relgym.numeric.stepwise import LinearFit, eliminate_backward, least_squares, with_unit
 
 __all__ = ["Cluster", "preferred", "refit", "role_matrix"]
 
@@ -143,8 +143,11 @@ def refit(
     mode = cluster.mode
     _, assignment = cluster.errors(table, rows, y, scale)
     x = role_matrix(mode, table, rows, assignment, cluster)
-    fit = least_squares(x, y, tuple(range(x.shape[1])), intercept=mode.intercept != 0.0)
-    fit = eliminate_backward(x, y, fit, sigma=scale.sigma)
+    # What counts from the present value does so: a weight of 1 isn't fitted, else it takes in what is small beside it.
+    kept = [k for k, term in enumerate(mode.roles[0].terms) if term == (mode.target.property, 1.0)]
+    others, rest = np.delete(x, kept, axis=1), y - x[:, kept].sum(axis=1)
+    fit = least_squares(others, rest, tuple(range(others.shape[1])), intercept=mode.intercept != 0.0)
+    fit = with_unit(eliminate_backward(others, rest, fit, sigma=scale.sigma), *kept)
     if np.abs(y - fit.predict(x)).max() > scale.tolerance:
         return done
     residual = float(np.sqrt(fit.rss / max(1, len(y) - fit.terms)))

@@ -85,15 +85,18 @@ class Mode:
         return replace(self, examples=examples)
 
     def same_function(self, other: Mode, tolerance: float = ROUNDED, *, constant: bool = True) -> bool:
-        """Whether both have the same roles, weights and (if `constant`) intercept, within `tolerance`."""
+        """Whether both have the same roles, weights and (if `constant`) intercept, within a share of `tolerance`.
+
+        Intercepts may differ by as much as noise, too: one that is but what rounding leaves of it has no size.
+        """
         pattern = [(r.type, [p for p, _ in r.terms]) for r in self.roles]
         if pattern != [(r.type, [p for p, _ in r.terms]) for r in other.roles]:
             return False
-        numbers = [
-            [w for role in m.roles for _, w in role.terms] + [m.intercept] * constant for m in (self, other)
-        ]
-        pairs = zip(*numbers, strict=True)
-        return all(abs(a - b) <= tolerance * max(1.0, abs(a), abs(b)) for a, b in pairs)
+        weights = [[w for role in m.roles for _, w in role.terms] for m in (self, other)]
+        if not all(abs(a - b) <= tolerance * max(abs(a), abs(b)) for a, b in zip(*weights, strict=True)):
+            return False
+        a, b = self.intercept, other.intercept
+        return not constant or abs(a - b) <= max(tolerance * max(abs(a), abs(b)), self.sigma, other.sigma)
 
     def formula(self, digits: int = DIGITS) -> str:
         """The function as text: ``vx' = 0.525 vx - 0.8227241 vy + 0.0004243524``.

@@ -16,6 +16,7 @@ from relgym.config.constants import (
     ENOUGH,
     MAJORITY,
     NEARLY_ALL,
+    NUMBER_BITS,
     RECENT,
     ROUGH,
     ROUNDED,
@@ -24,21 +25,26 @@ from relgym.config.constants import (
     TOLD,
     VERIFYING,
 )
+from relgym.numeric.ransac import consensus
 from relgym.numeric.stepwise import forward_stepwise, least_squares
 
-__all__ = ["estimate_noise", "refuted", "rounding_noise"]
+__all__ = ["coded_by_a_law", "estimate_noise", "refuted", "rounding_noise"]
 
 
 def rounding_noise(
-    x: NDArray[np.float64], y: NDArray[np.float64], observed: NDArray[np.float64] | None = None
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    observed: NDArray[np.float64] | None = None,
+    *,
+    changes: NDArray[np.float64] | None = None,
 ) -> float:
     """Standard deviation that mere rounding leaves, in units of y.
 
     Responses that float32 represents exactly are taken to have been rounded to it, as observations are. What counts
     then is their own size: a law's terms are rarely much larger than its value, and where they cancel, the estimate
     from the data says so later. In double precision columns count, too, since the room is there: a term that varies as
-    much as y does carries as many roundings more as its column lies further from 0 than it varies. So the noise doesn't
-    depend on the units of columns, nor on what never varies; columns that vary by rounding explain nothing.
+    much as y changes carries as many roundings more as its column lies further from 0 than it varies. So the noise
+    doesn't depend on the units of columns, nor on what never varies; columns that vary by rounding explain nothing.
 
     Parameters
     ----------
@@ -50,17 +56,21 @@ def rounding_noise(
         Those of the columns that are observed, not done, in recent rows, shape ``(k, c)``. Where one that varies was
         rounded to single precision, so were the responses, even if something was worked out from them since (an angle
         from its sine and cosine).
+    changes
+        By how much the responses differ from the property's values before; default: the responses. What keeps most of
+        its value, as a large sum does, owes only these to other columns.
     """
     largest = float(np.abs(y).max(initial=0.0))
     single = 2.0 * float(np.finfo(np.float32).eps)  # of the value before and of the one after
     if bool(_single(y).all()) and bool(np.any(y != np.round(y))):
         return single * max(largest, float(np.finfo(np.float32).tiny))
     if observed is not None and _rounded(observed):
-        return single * max(largest, 1.0)
+        return single * max(largest, min(float(np.abs(observed).max()), 1.0))
     size = np.abs(x).max(axis=0, initial=0.0)
     varies = np.ptp(x, axis=0) if len(x) else np.zeros_like(size)
     used = varies > ROUNDED * size
-    terms = size[used] / varies[used] * float(np.ptp(y)) if len(y) else size[used]
+    varied = min(float(np.ptp(each)) for each in (y, y if changes is None else changes)) if len(y) else 1.0
+    terms = size[used] / varies[used] * varied
     scale = max(float(terms.max(initial=0.0)), largest, ROUNDED)
     return ROUNDINGS * float(np.finfo(np.float64).eps) * scale
 
@@ -160,6 +170,44 @@ def _quartile(spreads: list[tuple[float, int]]) -> float:
     # Of a chi-square twice the root is nearly normal about sqrt(2 freedom - 1), with a deviation of 1 (Fisher 1922).
     root = math.sqrt(2.0 * freedom - 1.0) + NormalDist().inv_cdf(share)
     return float(np.quantile(values, quarter)) * math.sqrt(2.0 * freedom) / root
+
+
+def coded_by_a_law(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    sigma: float,
+    tolerance: float,
+    estimate: float,
+    *,
+    draws: int,
+    rng: np.random.Generator,
+) -> bool:
+    """Whether it takes fewer bits that some examples obey a function than that all obey one with more noise.
+
+    Where examples of several functions come by turns, as a gear, a choice or a switch has it, every window holds some
+    of each, and what a function leaves there is no noise. Told are, of each example that the function doesn't explain,
+    its value among all that were seen; and the function's numbers, and which columns they are of.
+
+    Parameters
+    ----------
+    x, y
+        Examples that no mode explains, with columns in order of preference: shapes ``(n, d)`` and ``(n,)``.
+    sigma, tolerance
+        The noise as assumed, and the largest residual of what a function explains then, in units of y.
+    estimate
+        The noise as estimated.
+    draws, rng
+        How many samples are drawn, and what draws them.
+    """
+    terms = 2
+    found = consensus(
+        x, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 1 + VERIFYING, draws=draws, rng=rng
+    )
+    if found is None:
+        return False
+    value = math.log2(max(float(np.ptp(y)) / tolerance, 2.0))
+    numbers = (found.fit.terms + 1) * NUMBER_BITS + math.log2(math.comb(x.shape[1], len(found.fit.columns)))
+    return (len(y) - found.size) * value + numbers < len(y) * math.log2(max(estimate / sigma, 1.0))
 
 
 def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:

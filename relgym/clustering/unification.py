@@ -12,7 +12,7 @@ from relgym.clustering.mode import Mode
 from relgym.config import ClusteringConfig
 from relgym.config.constants import FIRST, MAJORITY, VERIFYING
 from relgym.numeric.ransac import consensus
-from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares
+from relgym.numeric.stepwise import LinearFit, forward_stepwise, least_squares, with_unit
 from relgym.scene.objects import Target
 
 __all__ = ["covering", "reordered", "unified", "unified_family"]
@@ -78,10 +78,22 @@ def unified(
         return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
     if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < MAJORITY:
         return None  # on one side whatever is multiplied by nothing would do
+    most = min(config.max_terms, allowed)
     for width in stages[:1] if config.own_only else stages:
         x = slots.matrix(table.x[rows[pooled]], order[:width])
-        fit = forward_stepwise(x, y[pooled], sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
-        if fit.terms >= allowed or np.abs(y[pooled] - fit.predict(x)).max() > scale.tolerance:
+        fits = (
+            _fitted(x, y[pooled], scale, config.max_terms if c else most, changes=c)
+            for c in ((False, True) if own in order else (False,))
+        )
+        fit = next(
+            (
+                f
+                for f in fits
+                if f.terms < allowed and np.abs(y[pooled] - f.predict(x)).max() <= scale.tolerance
+            ),
+            None,
+        )
+        if fit is None:
             continue
         both = np.concatenate(everyone)
         x = slots.matrix(table.x[rows[both]], order[:width])
@@ -92,6 +104,18 @@ def unified(
         if min(shares) >= config.unify_ratio:
             return signature, reordered(found.fit, order)
     return None
+
+
+def _fitted(
+    x: NDArray[np.float64], y: NDArray[np.float64], scale: Scale, most: int, *, changes: bool
+) -> LinearFit:
+    """A function of responses, or of how they differ from the first column, the property's present value.
+
+    What little a large number changes by is lost where all of it is fitted: an odometer's way since the last step.
+    """
+    if not changes:
+        return forward_stepwise(x, y, sigma=scale.sigma, max_terms=most)
+    return with_unit(forward_stepwise(x[:, 1:], y - x[:, 0], sigma=scale.sigma, max_terms=most - 1), 0)
 
 
 def _persist(

@@ -96,9 +96,11 @@ def _bin_one(values: Float, positive: NDArray[np.bool_]) -> tuple[Int, Float, Fl
 def rounding(values: Float) -> float:
     """Return the difference up to which two of some finite values are the same number, computed in two ways.
 
-    Relative to the greatest of them, or to 1: how far things that touch are apart is what positions are rounded by.
+    Relative to the greatest of them. Of numbers that are all next to nothing, all are the same: how far things that
+    touch are apart is what positions are rounded by.
     """
-    return ROUNDED * float(np.abs(values).max(initial=1.0))
+    greatest = float(np.abs(values).max(initial=0.0))
+    return ROUNDED * greatest if greatest > ROUNDED else ROUNDED
 
 
 def signs_differ(low: Float | float, high: Float | float) -> NDArray[np.bool_] | bool:

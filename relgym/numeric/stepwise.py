@@ -32,6 +32,7 @@ __all__ = [
     "forward_stepwise",
     "least_squares",
     "varying_columns",
+    "with_unit",
 ]
 
 _Size = TypeVar("_Size", float, NDArray[np.float64])
@@ -69,6 +70,15 @@ class LinearFit:
         for column, weight in zip(self.columns, self.weights, strict=True):
             value += weight * x[:, column]
         return value
+
+
+def with_unit(fit: LinearFit, column: int | None = None) -> LinearFit:
+    """A function of all columns but one, with a weight of 1 for that one; None: the same function."""
+    if column is None:
+        return fit
+    columns = (column, *(c + (c >= column) for c in fit.columns))
+    pairs = sorted(zip(columns, (1.0, *fit.weights), strict=True))
+    return LinearFit(tuple(c for c, _ in pairs), tuple(w for _, w in pairs), fit.intercept, fit.rss)
 
 
 def varying_columns(x: NDArray[np.float64]) -> NDArray[np.intp]:

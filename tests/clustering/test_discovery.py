@@ -342,3 +342,44 @@ def test_bits_that_an_example_verifies_by() -> None:
     # 24 bits need ten examples, each of 12 bits less 2.5 more.
     for bits, needed in ((24, 10), (18, 25), (12, 40), (6, 40), (30, 10)):
         assert least_examples(np.array([0.0, 2.0**bits]), scale, CONFIG) == needed
+
+
+def test_a_clock_takes_steps_and_isnt_stretched(rng: np.random.Generator) -> None:
+    x = 1.7e9 + np.sort(rng.uniform(0.0, 1e3, 60))[:, None]
+    found = find_mode(
+        x,
+        x[:, 0] + 0.25,
+        np.zeros(60, dtype=int),
+        stages=(1,),
+        fresh=60,
+        scale=Scale(1e-5, 4.0, 6.0),
+        config=CONFIG,
+        rng=rng,
+        present=0,
+    )
+    assert found is not None
+    assert (found.fit.columns, found.fit.weights) == ((0,), (1.0,))
+    assert found.fit.intercept == pytest.approx(0.25, abs=1e-6)
+    assert found.size == 60
+
+
+@pytest.mark.parametrize("share", [0.25, 0.75])
+def test_of_a_switch_of_two_values_most_rows_tell_a_law_without_it(
+    share: float, rng: np.random.Generator
+) -> None:
+    """Whether they are values of a law of the switch or of two laws two values don't tell."""
+    on = np.repeat([0.0, 1.0], [round(60 * (1.0 - share)), round(60 * share)])
+    x = np.column_stack([rng.normal(size=60), on])
+    y = 0.95 * x[:, 0] + 1.2 * x[:, 1] + 0.25
+    found = evaluated(x, y, least_squares(x, y, (0, 1)))
+    assert found is not None
+    assert found.fit.columns == (0,)
+    assert found.fit.weights == pytest.approx((0.95,))
+    assert found.fit.intercept == pytest.approx(1.45 if share > 0.5 else 0.25)
+    assert found.inliers.tolist() == (on == round(share)).tolist()
+
+
+def test_of_a_switch_that_is_on_half_of_the_time_no_law_is_told(rng: np.random.Generator) -> None:
+    x = np.column_stack([rng.normal(size=60), np.repeat([0.0, 1.0], 30)])
+    y = 0.95 * x[:, 0] + 1.2 * x[:, 1] + 0.25
+    assert evaluated(x, y, least_squares(x, y, (0, 1))) is None

@@ -144,3 +144,13 @@ def test_errors_of_two_sigma_are_ties_and_larger_ones_are_not() -> None:
     assert preferred([1, 2], {1: 0.021, 2: 0.0}, clusters, scale) == 2
     assert preferred([1, 2], {1: 0.03, 2: 0.035}, clusters, scale) == 1
     assert preferred([2], {2: 9.0}, clusters, scale) == 2
+
+
+def test_what_counts_from_the_present_value_goes_on_doing_so(rng: np.random.Generator) -> None:
+    """Of a clock far from 0 a weight beside 1 would be as good, in the tolerance, and say nothing of its steps."""
+    x = np.column_stack([1.7e9 + rng.uniform(0.0, 1e3, 40), np.zeros(40)])
+    stream, rows = filled(ALONE, x)
+    clock = Cluster(mode_of(("v", 1.0), constant=0.1))
+    done = refit(clock, stream.table, rows, x[:, 0] + 0.25, Scale(1e-5, 4.0, 8.0))
+    assert dict(done.mode.roles[0].terms) == {"v": 1.0}
+    assert done.mode.intercept == pytest.approx(0.25, abs=1e-7)

@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from relgym.clustering.noise import _quartile, _windows, estimate_noise, refuted, rounding_noise
+from relgym.clustering.noise import (
+    _quartile,
+    _windows,
+    coded_by_a_law,
+    estimate_noise,
+    refuted,
+    rounding_noise,
+)
 from relgym.config.constants import ENOUGH
 
 EPS = float(np.finfo(np.float64).eps)
@@ -137,3 +144,30 @@ def test_when_an_estimate_refutes_what_was_assumed(
 ) -> None:
     y = np.resize([100.0, -100.0], n)
     assert refuted(1.0, estimate, explained=explained, y=y) is expected
+
+
+def test_of_a_large_sum_only_its_changes_are_owed_to_other_columns() -> None:
+    """A column that varies by a ten-thousandth of itself could be as rough as `y`, or as its changes."""
+    y = np.array([5e4, 9e4, 2e4])
+    tank = np.array([[20.0], [19.999], [19.998]])
+    rough = 20.0 / 0.002
+    assert rounding_noise(tank, y) == pytest.approx(32 * EPS * rough * 7e4)
+    changes = np.array([3e-5, 1e-5, 2e-5])
+    assert rounding_noise(tank, y, changes=changes) == pytest.approx(32 * EPS * 9e4)
+
+
+@pytest.mark.parametrize("kinds", [1, 2, 4])
+@pytest.mark.parametrize("seed", range(3))
+def test_functions_that_hold_by_turns_are_no_noise(kinds: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, which = rng.normal(size=(80, 3)), rng.integers(kinds, size=80)
+    y = (1.0 + which) * x[:, 0] + 0.25 * which
+    assert coded_by_a_law(x, y, 1e-14, 4e-14, float(y.std()) / 2, draws=1_500, rng=rng)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_is_no_law(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(80, 3))
+    y = 2.0 * x[:, 0] + 0.1 * rng.normal(size=80)
+    assert not coded_by_a_law(x, y, 1e-14, 4e-14, 0.1, draws=1_500, rng=rng)

@@ -199,7 +199,7 @@ class _Look:
         self._share = config.downsampling
         noise = config.clustering.noise_std
         # Who says how large the noise is takes it for granted.
-        self._least = WRONG if isinstance(noise, str) else max(WRONG, config.clustering.inlier_stds * noise)
+        self._least = 0.0 if isinstance(noise, str) else config.clustering.inlier_stds * noise
         self._off: set[tuple[str, str]] = set()
         # A number from 0 to 1 for this step; a model that is loaded again draws the same.
         trials = sum([model.calibration.trials for model in parts.models.values()])
@@ -210,8 +210,10 @@ class _Look:
         self.confirmed: dict[tuple[str, str], Confirmed] = {}
         self.counted = True
 
-    def _rounding(self, came: float) -> float:
-        return max(WRONG, self._precision * max(1.0, abs(came)))
+    def _rounding(self, came: float, most: float) -> float:
+        """What is rounding where a target is at most so large: `WRONG`, or as small a share of what is smaller."""
+        most = min(most, 1.0)
+        return max(WRONG * most, self._precision * max(most, abs(came)))
 
     def repeats(self, part: Prediction, residual: float, answer: Answer) -> bool:
         """Whether a prediction came out as such ones do and another one stands for it: it is counted, no more."""
@@ -231,7 +233,9 @@ class _Look:
         if part.outcome is not Outcome.PREDICTED or not part.mode or record.speaker != OWN:
             return False
         within = (
-            self._rounding(part.value + residual) if lawful else model.clusterer.population.scale.tolerance
+            self._rounding(part.value + residual, 1.0)
+            if lawful
+            else model.clusterer.population.scale.tolerance
         )
         if not abs(residual) <= within:
             return False
@@ -257,7 +261,7 @@ class _Look:
             self._stands = 1
             return False
         came = part.value + residual
-        rounding = max(self._rounding(came), self._least)
+        rounding = max(self._rounding(came, model.clusterer.reach), self._least)
         if argued := isinstance(record, Audit):
             values: Sequence[float] = record.values
         else:  # to ask the others would take longer than predicting
@@ -288,7 +292,7 @@ class _Look:
         self.counted = False
         target, model, _, _, turn = answer
         came, audit = part.value + residual, part.audit
-        rounding = self._rounding(came)
+        rounding = self._rounding(came, 1.0 if self._parts.governs(target) else model.clusterer.reach)
         misled = self._misled(answer)
         if audit is not None:
             rounding = max(rounding, self._least)
