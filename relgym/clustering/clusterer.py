@@ -280,13 +280,13 @@ class ModeClusterer:
         self._estimating &= not estimating
         if estimating and 2 * self.noise_examples > self.seen:
             budget.spend(2 * SEARCHED_CELLS)  # two kinds of functions: each takes a look at as many numbers
-            part, x, own = self._unclear(table)
+            part, x, width = self._unclear(table)
             strata = table.strata[self.rows[part]]
-            estimate = estimate_noise(x, self.y[part], strata, floor=floor, own=own)
+            estimate = estimate_noise(x, self.y[part], strata, floor=floor, own=width)
             if (
                 estimate is not None
                 and self._refutes(estimate)
-                and not self._lawful(part, x[:, :own], estimate)
+                and not self._lawful(part, x[:, :width], estimate)
             ):
                 self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
