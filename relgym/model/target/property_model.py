@@ -613,6 +613,13 @@ class PropertyModel:
         return not any(self.claims(key, told) for key, told in kinds)
 
     @property
+    def claimed(self) -> float:
+        """Share of its modes' predictions so far that are of kinds which are claimed by now; 1 where none was made."""
+        kinds = [(key, heard, told) for key, heard, told in self.record.kinds(_PREDICTED)]
+        every = sum(heard for _, heard, _ in kinds)
+        return sum(heard for key, heard, told in kinds if self.claims(key, told)) / every if every else 1.0
+
+    @property
     def asks_latest(self) -> bool:
         """Whether the mode that held last is asked: not where the vote's winners are mostly right.
 

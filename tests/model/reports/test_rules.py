@@ -359,3 +359,20 @@ def test_a_law_that_reads_what_is_not_predicted_predicts_nothing_and_says_so() -
     assert not any(
         part.ok for part in model.predict_one(model.schema.scene({"self": [0.0, 0.0], ACTION: [0.0]})).parts
     )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_is_hardly_ever_claimed_is_printed_as_no_prediction(seed: int) -> None:
+    """A lamp that a switch turns on for sure, and that else goes on and off by chance once in 25 steps."""
+    rng, schema = np.random.default_rng(seed), schema_of(("x",), ("u",))
+    model, x = WorldModel(schema), 0.0
+    for u in rng.uniform(0.0, 1.0, 1_500).tolist():
+        now, x = x, 1.0 if u > 0.85 else abs(x - float(rng.random() < 0.04))
+        before = {"self": (now,), "action": (u,)}
+        step = Transition(schema.scene(before), schema.scene(before | {"self": (x,)}))
+        compare_and_learn(model, step, model.predict_one(step.before))
+    part = model.property_model("self", "x")
+    assert not part.doubtful and 0.0 < part.claimed < 0.1
+    doubt = model.rules().properties[0].doubt
+    assert re.fullmatch(r"too few such predictions .* to claim any, but in [\d.]+ % of steps", doubt)
+    assert f"no prediction: {doubt}" in model.describe()
