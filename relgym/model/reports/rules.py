@@ -35,7 +35,7 @@ from relgym.classification.binary import BinaryClassifier
 from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.role_classifier import RoleKind
 from relgym.classification.views import View
-from relgym.clustering.mode import Mode
+from relgym.clustering.mode import NOISE, Mode
 from relgym.config.constants import MAJORITY, ROUGH
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
@@ -347,8 +347,9 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
         most = max(modes, key=lambda m: (_counts(part)[m], -m))
         return (_branch(part, (), most, functions, _counts(part)[most]),)
     view, weights, ranking = part.classifier.remembered()
+    exemplars = part.classifier.exemplars
+    labels = part.clusterer.labels[exemplars.rows.astype(np.intp)]
     if part.past:  # what followed functions that have ended follows none of these
-        labels = part.clusterer.labels[part.classifier.exemplars.rows.astype(np.intp)]
         weights = np.where(np.isin(labels, list(part.past)), 0.0, weights)
     atoms = _atoms(part, view, functions)
     allowed = _allowed(part, view, ranking.modes[:, 0])
@@ -357,9 +358,11 @@ def _branches(part: PropertyModel, functions: dict[int, Sum]) -> tuple[Branch, .
         1 + len(atom.test.clause) + (atom.test.context == "all" and atom.test.clause.variables > 1)
         for atom in atoms
     ]
-    nobody = part.classifier.exemplars.assigned == UNKNOWN
+    nobody = exemplars.assigned == UNKNOWN
     rules = decision_list(truth, allowed, weights, cost, doubtful=nobody, budget=DOUBT)
-    right = part.classifier.exemplars.columns["fits"]
+    # What a bound decides is right of every branch: it has the last word.
+    bounds = {part.limits.low, part.limits.high, *(each.mode for each in part.stops.every)} - {NOISE}
+    right = exemplars.columns["fits"] | np.isin(labels, sorted(bounds))[:, None]
     # Examples stand for others in whole numbers, which add up to a few steps more or less than there were.
     total = part.clusterer.population.unexplained + sum(
         mode.examples for mode in part.modes if mode.id not in part.past
