@@ -42,9 +42,11 @@ def make_env() -> gym.Env[Any, Any]:
 
 def main(args: Args) -> None:
     """Train SAC with Dyna, test it, and lay a dreamed episode beside the real one."""
+    import torch
     from stable_baselines3 import SAC
     from stable_baselines3.common.logger import Logger
 
+    torch.set_num_threads(1)  # nets this small lose by more
     env = make_env()
     env.action_space.seed(args.seed)
     model = relgym.WorldModel(env.get_wrapper_attr("schema"))

@@ -23,7 +23,7 @@ MOVES = ("south", "north", "east", "west", "pickup", "dropoff")
 class Args:
     """Settings; each is a command-line option."""
 
-    steps: int = 1500
+    steps: int = 3000
     """transitions to learn from"""
     seed: int = 0
     """seed of episodes and actions"""

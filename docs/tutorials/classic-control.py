@@ -34,7 +34,7 @@ print(plain.model.describe(digits=4))
 
 # %% [markdown]
 # The position is explained: it goes on by the *next* velocity. The velocity isn't. The model has found a line
-# that leaves 0.67 % of its change, says so, and names the features with which a law explains all of it. So we
+# that leaves less than 1 % of its change, says so, and names the features with which a law explains all of it. So we
 # switch those on, and give the numbers names.
 
 # %%

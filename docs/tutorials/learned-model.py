@@ -24,7 +24,7 @@ _ = plt.axis("off")
 # %% [markdown]
 # ## Learn the world
 #
-# A thousand random pushes. What counts here is the curve: after some 320 steps no prediction is wrong any
+# A thousand random pushes. What counts here is the curve: after a few hundred steps no prediction is wrong any
 # more.
 
 # %%

@@ -983,7 +983,8 @@ class WorldModel:
         path
             Where to write.
         history
-            Whether to keep what further learning needs; without it the loaded model can only predict.
+            Whether to keep what further learning needs; without it the loaded model can only predict. What is put off
+            while it learns is done for the file first, as by `finish`: values that aren't claimed may be better there.
         extra
             Plain data of the caller's; default: the attribute `extra`, where a learner around an env keeps its spaces.
         """
