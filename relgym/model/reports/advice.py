@@ -16,7 +16,7 @@ from relgym.clustering.columns import SlotSignature
 from relgym.clustering.examples import ExampleTable
 from relgym.clustering.features import library_of, offered, switched_on
 from relgym.clustering.mode import NOISE, sum_text
-from relgym.config.constants import MOST_FEATURES, NEARLY_ALL, ROUGH
+from relgym.config.constants import MAJORITY, MOST_FEATURES, NEARLY_ALL, ROUGH
 from relgym.model.parts import Parts
 from relgym.model.reports.distant import DistantForce, distant_forces
 from relgym.model.reports.text import percent
@@ -129,6 +129,7 @@ class _Trial:
     law: str
     size: int
     bare: bool = False  # whether the law needs none of the features
+    squares: float = 0.0  # mean square of what it leaves of all examples
 
 
 def advise(model: PropertyModel, table: ExampleTable) -> Advice | None:
@@ -166,7 +167,11 @@ def _lacks(model: PropertyModel, table: ExampleTable) -> Advice | None:
     good = min((t.left for t in trials if t is not None), default=1.0) <= GOOD
     if not good and not known.issuperset(LAST_RESORT):
         trials.append(_try(model, table, recent, LAST_RESORT))
-    best = _choose([t for t in trials if t is not None], left)
+    found = [t for t in trials if t is not None]
+    if undecided:  # a law in place of several modes must tell what one of them alone doesn't
+        least = _least_squares(model, table, recent)
+        found = [t for t in found if t.squares <= MAJORITY * least]
+    best = _choose(found, left)
     if best is not None and best.bare:
         if clusterer.clusters and best.left <= GOOD and not undecided:
             return None  # the law is of the form that it has, and what it leaves is noise
@@ -193,6 +198,13 @@ def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
     # Where no mode applies the error is infinite, and between that and others there is no middle.
     reach = float(np.quantile(np.min(parts, axis=0), NEARLY_ALL, method="higher")) / normal_reach()
     return max(c.scale.sigma, reach)
+
+
+def _least_squares(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:
+    """Mean square of what the best single mode leaves of all examples; infinite where none says something of all."""
+    c = model.clusterer
+    errors = [k.errors(table, c.rows[rows], c.y[rows], c.scale)[0] for k in c.clusters.values()]
+    return min((float(np.square(each).mean()) for each in errors), default=math.inf)
 
 
 def advices(parts: Parts) -> tuple[Advice, ...]:
@@ -271,7 +283,8 @@ def _try(
     ]
     law = f"{model.target.property}' = {sum_text(text, found.fit.intercept, 4)}"
     bare = all(order[c] < len(slots.columns) for c in found.fit.columns)
-    return _Trial(entries, found.sigma / change, law, len(order), bare)
+    squares = float(np.square(y - found.fit.predict(x)).mean())
+    return _Trial(entries, found.sigma / change, law, len(order), bare, squares)
 
 
 def _present(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from points import formulas, learned, schema_of, transitions
 
+from relgym.model.learning.fitting import compare_and_learn
 from relgym.model.predicting.prediction import Outcome
 from relgym.model.reports.advice import LAST_RESORT, Advice, _choose, _Trial, _try, together
 from relgym.model.world_model import WorldModel
@@ -259,3 +260,31 @@ def test_most_left_over_is_unexplained_whatever_the_rest_leaves() -> None:
         "an approximation that leaves 6.6 % of the change; ModelConfig(features=('trig',)) explains it: v' = sin(v)"
     )
     assert told[0.8] == f"unexplained; {told[0.2]}"
+
+
+def deck(steps: int, seed: int) -> list[Transition]:
+    """Twenty cards of five values, of which some are drawn: how many are left of three of them."""
+    rng, schema = np.random.default_rng(seed), schema_of(tuple("abc"), ("draws",))
+    found = []
+    for k in range(steps):
+        if k % 6 == 0:
+            left = np.full(5, 4)
+        draws = int(rng.integers(2))
+        before = {"self": left[:3], "action": (draws,)}
+        if draws:
+            card = int(rng.choice(5, p=left / left.sum()))
+            left = left - np.eye(5, dtype=int)[card]
+        found.append(Transition(schema.scene(before), schema.scene(before | {"self": left[:3]})))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_what_is_drawn_no_library_tells_which(seed: int) -> None:
+    """Of few values there is always a curve through most; one that tells which of two follows is another matter."""
+    steps = deck(1_500, seed)
+    model = WorldModel(steps[0].before.schema)
+    for step in steps:
+        compare_and_learn(model, step, model.predict_one(step.before))
+    advice = model.advice()
+    assert len(advice) == 3
+    assert [each.target for each in advice if each.features] == []
