@@ -24,7 +24,7 @@ PlainTarget: TypeAlias = Target | str | Sequence[Any]
 
 def targets_of(given: Iterable[PlainTarget] | None) -> list[Target] | None:
     """The targets that are meant; `ConfigError` where some are none."""
-    if isinstance(given, str):
+    if isinstance(given, (str, Target)) or not (given is None or isinstance(given, Iterable)):
         raise ConfigError(f"targets={given!r}: expected several, such as [{given!r}]")
     return None if given is None else [target_of(t) for t in given]
 

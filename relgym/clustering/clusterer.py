@@ -258,7 +258,7 @@ class ModeClusterer:
         bare = Mode(
             self.population.next_id, self.target, (Role(self.target.type, ()),), 0.0, sigma=self.scale.sigma
         )
-        if any(bare.same_function(c.mode) for c in self.clusters.values()):
+        if any(bare.same_function(c.mode, slack=self.scale.sigma) for c in self.clusters.values()):
             return
         self.clusters[bare.id] = Cluster(bare, fitted=len(idle))
         self.population.next_id += 1
@@ -286,7 +286,7 @@ class ModeClusterer:
             if (
                 estimate is not None
                 and self._refutes(estimate)
-                and not self._lawful(part, x[:, :width], estimate)
+                and not self._lawful(part, x[:, :width], estimate, budget)
             ):
                 self._spread, self.population.approximate = estimate if estimate > floor else 0.0, False
                 self._start_over()
@@ -311,15 +311,17 @@ class ModeClusterer:
 
         Where only rounding was assumed, they leave more than that if less of it is now: columns have been seen to vary.
         """
-        rounding = self._spread <= self.floor and not self.approximate
+        rounding, moved = self._spread <= self.floor and not self.approximate, False
         if (self.population.chancy or rounding) and self.config.noise_std == "auto":
             left = self.population.residual_spread(table)
             if left > self.floor * (1.0 if self.population.chancy else ROUGH):
                 self._spread = left
                 self._assume(left)
                 if rounding:  # what no mode explained for want of tolerance
-                    self.population.reassign_all(table)
-        return self.search.review(table)
+                    noise = self.population.noise()
+                    self.population.rehome(table, noise)
+                    moved = len(self.population.noise()) < len(noise)
+        return self.search.review(table) or moved
 
     def _unclear(self, table: ExampleTable) -> tuple[NDArray[np.intp], NDArray[np.float64], int]:
         """Examples of the signature that holds most of the unexplained ones, their columns, and how many are own."""
@@ -331,13 +333,15 @@ class ModeClusterer:
         order = order[order < len(slots.columns)]
         return part, table.x[self.rows[part]][:, order], stages[0]
 
-    def _lawful(self, part: NDArray[np.intp], x: NDArray[np.float64], estimate: float) -> bool:
+    def _lawful(
+        self, part: NDArray[np.intp], x: NDArray[np.float64], estimate: float, budget: Budget
+    ) -> bool:
         """Whether a law that too few obey yet says more of the first examples than so much noise does."""
         if len(self.y) >= RECENT or estimate <= self.scale.sigma:
             return False
         left = self.labels[part] == NOISE
-        rng = np.random.default_rng(len(self.y))
-        scale = self.scale
+        rng, scale = np.random.default_rng(len(self.y)), self.scale
+        budget.spend(self.config.draws * x.shape[1] * FEWEST)
         return coded_by_a_law(
             x[left],
             self.y[part[left]],
@@ -428,7 +432,11 @@ class ModeClusterer:
         self.population.rehome(table, np.arange(first, len(self.population.log)))
         matched = {NOISE: NOISE}
         for i, cluster in sorted(other.clusters.items()):
-            alike = [k for k, c in sorted(self.clusters.items()) if c.mode.same_function(cluster.mode, ALIKE)]
+            alike = [
+                k
+                for k, c in sorted(self.clusters.items())
+                if c.mode.same_function(cluster.mode, ALIKE, slack=self.scale.sigma)
+            ]
             if alike:
                 matched[i] = alike[0]
             elif (
@@ -460,7 +468,7 @@ class ModeClusterer:
             **({"chancy": True} if self.population.chancy else {}),
             **({"estimating": True} if self._estimating else {}),
             **({"passed": passed} if passed else {}),
-            "noise": self.noise_examples,
+            "noise": self.population.unexplained,
             "modes": [m.to_json() for m in self.modes],
             "fitted": [[i, c.fitted, c.unfitted] for i, c in sorted(self.clusters.items())],
             **self.search.to_json(),

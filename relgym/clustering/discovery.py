@@ -50,6 +50,7 @@ from relgym.config.constants import (
 from relgym.numeric.ransac import Consensus, consensus, extrapolated, refine
 from relgym.numeric.stepwise import (
     LinearFit,
+    eliminate_backward,
     fitting_cells,
     forward_stepwise,
     least_squares,
@@ -288,7 +289,8 @@ def _counting_from(
         return found
     rows = found.inliers
     others = tuple(c - (c > present) for c in weights)
-    fit = least_squares(np.delete(x[rows], present, axis=1), y[rows] - x[rows, present], others)
+    left, rest = np.delete(x[rows], present, axis=1), y[rows] - x[rows, present]
+    fit = eliminate_backward(left, rest, least_squares(left, rest, others), sigma=scale.sigma)
     if fit.terms > found.fit.terms:
         return found
     fit = with_unit(fit, present)
@@ -474,8 +476,9 @@ def identified(
 
     Two things are refused. A weight that fewer than `support` examples determine (a leverage point fixes it
     at nonsense). Weights on columns that take few distinct values, when there are too few of those to tell a
-    law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations. And a function of as
-    many numbers as there are values to be told is a table of constants, of which the commonest is left.
+    law from a look-up of per-scene constants: k such columns need 2 k + 2 distinct combinations; of a combination that
+    most rows have, the function without these columns is left. And a function of as many numbers as there are values
+    to be told is a table of constants, of which the commonest is left.
     """
     for _ in range(len(fit.columns) + 2):
         found = yield from refine.steps(

@@ -84,10 +84,12 @@ class Mode:
         """The same mode with another example count."""
         return replace(self, examples=examples)
 
-    def same_function(self, other: Mode, tolerance: float = ROUNDED, *, constant: bool = True) -> bool:
+    def same_function(
+        self, other: Mode, tolerance: float = ROUNDED, *, constant: bool = True, slack: float = 0.0
+    ) -> bool:
         """Whether both have the same roles, weights and (if `constant`) intercept, within a share of `tolerance`.
 
-        Intercepts may differ by as much as noise, too: one that is but what rounding leaves of it has no size.
+        Intercepts may differ by `slack`, too: one that is but what rounding leaves of it has no size of its own.
         """
         pattern = [(r.type, [p for p, _ in r.terms]) for r in self.roles]
         if pattern != [(r.type, [p for p, _ in r.terms]) for r in other.roles]:
@@ -96,7 +98,7 @@ class Mode:
         if not all(abs(a - b) <= tolerance * max(abs(a), abs(b)) for a, b in zip(*weights, strict=True)):
             return False
         a, b = self.intercept, other.intercept
-        return not constant or abs(a - b) <= max(tolerance * max(abs(a), abs(b)), self.sigma, other.sigma)
+        return not constant or abs(a - b) <= max(tolerance * max(abs(a), abs(b)), slack)
 
     def formula(self, digits: int = DIGITS) -> str:
         """The function as text: ``vx' = 0.525 vx - 0.8227241 vy + 0.0004243524``.

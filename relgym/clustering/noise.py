@@ -206,7 +206,7 @@ def coded_by_a_law(
     if found is None:
         return False
     value = math.log2(max(float(np.ptp(y)) / tolerance, 2.0))
-    numbers = (found.fit.terms + 1) * NUMBER_BITS + math.log2(math.comb(x.shape[1], len(found.fit.columns)))
+    numbers = found.fit.terms * NUMBER_BITS + math.log2(math.comb(x.shape[1], len(found.fit.columns)))
     return (len(y) - found.size) * value + numbers < len(y) * math.log2(max(estimate / sigma, 1.0))
 
 

@@ -296,7 +296,9 @@ class Population:
         """Put a mode in the place of those it absorbed; its id: of one with the same function, as which it is known."""
         known = self.log.forgotten, self.log.passed
         inherited = [sum(counted.pop(i, 0) for i in absorbed) for counted in known]
-        same = [i for i in absorbed if self.clusters[i].mode.same_function(cluster.mode)]
+        same = [
+            i for i in absorbed if self.clusters[i].mode.same_function(cluster.mode, slack=self.scale.sigma)
+        ]
         for i in absorbed:
             self.remove(i)
         new = same[0] if same else self.next_id

@@ -320,10 +320,11 @@ class Planner:
         space: Any = self.simulator.observation_space
         one: Any = observation
         while isinstance(parts := getattr(space, "spaces", None), Mapping | Sequence) and parts:
-            name = (
-                next(iter(parts)) if isinstance(parts, Mapping) else 0
-            )  # what tells of one part tells of all
-            if not isinstance(one, Mapping | tuple) or (isinstance(one, Mapping) and name not in one):
+            named = isinstance(parts, Mapping)
+            name = next(iter(parts)) if named else 0  # what tells of one part tells of all
+            if not isinstance(one, Mapping if named else tuple):
+                return None
+            if name not in (one if named else range(len(one))):
                 return None
             space, one = parts[name], one[name]
         if not isinstance(one, np.ndarray) or one.ndim != len(space.shape or ()) + 1:

@@ -301,3 +301,20 @@ def test_ids_are_never_used_twice(rng: np.random.Generator) -> None:
         reports += stream.feed([(float(level + 1), 1.0)] * 12, [0.5 * level + 1.0] * 12)
     created = [i for r in reports for i in r.created]
     assert all(a < b for a, b in pairwise(created))
+
+
+def test_what_a_mode_leaves_is_noise_once_less_rounding_is_assumed(rng: np.random.Generator) -> None:
+    """A clock beside it runs for hours and then for months: what its rounding could have explained it can't any more.
+
+    Until then what is off by more than the rounding that is left is taken for unexplained, and then for what it is.
+    """
+    x = states(rng, 400)
+    x[:, 1] = 1.7e9 + np.concatenate([np.linspace(0.0, 20.0, 150), rng.uniform(0.0, 1e8, 250)])
+    y = 0.9 * x[:, 0] + rng.normal(scale=1e-9, size=400)
+    stream = Stream()
+    reports = stream.feed(x, y)
+    assert len(stream.clusterer.modes) == 1
+    assert stream.clusterer.scale.sigma == pytest.approx(1e-9, rel=0.3)
+    assert stream.clusterer.floor < 1e-12
+    assert stream.clusterer.noise_examples <= 4
+    assert any(report.reassigned for report in reports)

@@ -51,6 +51,14 @@ def test_the_same_function_to_nine_digits() -> None:
     assert one.same_function(mode_of(("v", 0.5), others=[box(-2.5)]), constant=False)
 
 
+def test_numbers_are_compared_by_their_own_size() -> None:
+    small = mode_of(("v", 1e-12), constant=1e-12)
+    assert not small.same_function(mode_of(("v", 2e-12), constant=1e-12))
+    assert not small.same_function(mode_of(("v", 1e-12), constant=2e-12))
+    assert small.same_function(mode_of(("v", 1e-12), constant=2e-12), slack=1e-12)
+    assert not small.same_function(mode_of(("v", 2e-12), constant=1e-12), slack=1e-12)
+
+
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 

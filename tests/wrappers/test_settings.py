@@ -42,6 +42,9 @@ def test_what_names_no_target(given: Any) -> None:
 def test_one_name_isnt_several() -> None:
     with pytest.raises(ConfigError, match=r"targets='cart.v': expected several, such as \['cart.v'\]"):
         targets_of("cart.v")
+    for given in (Target("cart", "v"), 3):
+        with pytest.raises(ConfigError, match="expected several"):
+            targets_of(given)  # type: ignore[arg-type]
     assert targets_of(["cart.v"]) == [Target("cart", "v")]
     assert targets_of(None) is None
 

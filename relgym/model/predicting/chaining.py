@@ -89,7 +89,8 @@ class Inquiry:
 def inquire(parts: Parts, look: Look) -> Inquiry | None:
     """Begin to look for a law with next values of one target.
 
-    Cost of the search: at most `SEARCHED_ROWS` rows; none where the target is explained by a law of two terms already.
+    Cost of the search: at most `SEARCHED_ROWS` rows; none where the target is explained already, by laws of two terms,
+    or by laws of change where others are looked for.
     """
     type_name, prop, _ = look
     return _search(parts, parts.property_model(type_name, prop).target, look)
@@ -97,16 +98,15 @@ def inquire(parts: Parts, look: Look) -> Inquiry | None:
 
 def revise(parts: Parts, inquiry: Inquiry) -> None:
     """A search for a law with next values is done: give the target what it needs."""
-    type_name, prop, inert = inquiry.look
+    type_name, prop, _ = inquiry.look
     target = parts.property_model(type_name, prop).target
     found = inquiry.task.result
     if found is None or target != inquiry.target or not set(found.given) <= set(_free(parts, target)):
         return  # what was true of the order then needn't be now
-    if found.inert >= inert:
-        parts.retarget(target, replace(target, given=found.given))
-        if found.lead is not None:
-            rate, step = found.lead
-            parts.lead((type_name, rate), prop, step)
+    parts.retarget(target, replace(target, given=found.given))
+    if found.lead is not None:
+        rate, step = found.lead
+        parts.lead((type_name, rate), prop, step)
 
 
 def in_order(targets: Iterable[Target]) -> tuple[Target, ...]:

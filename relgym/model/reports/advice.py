@@ -201,8 +201,10 @@ def _remains(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) 
 
 
 def _least_squares(model: PropertyModel, table: ExampleTable, rows: NDArray[np.intp]) -> float:
-    """Mean square of what the best single mode leaves of all examples; infinite where none says something of all."""
+    """Mean square of what the best single mode leaves of the newest signature's examples; infinite if none applies."""
     c = model.clusterer
+    ids = table.signature_ids[c.rows[rows]]
+    rows = rows[ids == ids[-1]]
     errors = [k.errors(table, c.rows[rows], c.y[rows], c.scale)[0] for k in c.clusters.values()]
     return min((float(np.square(each).mean()) for each in errors), default=math.inf)
 

@@ -36,7 +36,7 @@ from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.role_classifier import RoleKind
 from relgym.classification.views import View
 from relgym.clustering.mode import NOISE, Mode
-from relgym.config.constants import MAJORITY, ROUGH
+from relgym.config.constants import LEFT_OPEN, ROUGH
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
@@ -267,7 +267,7 @@ def _doubt(part: PropertyModel) -> str:
             return _UNTRIED
         share = max(shares)
         return f"at best {share:.3g} % of such predictions are expected to be right, too few to claim any"
-    if (share := part.claimed) < MAJORITY:
+    if (share := part.claimed) <= LEFT_OPEN:
         return f"too few such predictions are expected to be right to claim any, but in {100.0 * share:.2g} % of steps"
     known = part.calibration.trials and part.config.abstain
     return "nothing tells yet which of these holds" if part.undecided and not known else ""

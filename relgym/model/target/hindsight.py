@@ -38,7 +38,8 @@ __all__ = [
 ]
 
 WRONG = ROUNDED
-"""A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded."""
+"""A prediction off by more than this, in units of the property, counts as wrong; more where numbers are rounded, and to
+those who learn from it less where a property never reaches 1."""
 
 
 class Standing(Enum):
