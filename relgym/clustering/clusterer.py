@@ -317,7 +317,7 @@ class ModeClusterer:
             if left > self.floor * (1.0 if self.population.chancy else ROUGH):
                 self._spread = left
                 self._assume(left)
-                if rounding:  # what no mode explained for want of tolerance
+                if rounding:  # what was beyond the tolerance that there was
                     noise = self.population.noise()
                     self.population.rehome(table, noise)
                     moved = len(self.population.noise()) < len(noise)
