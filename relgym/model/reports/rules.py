@@ -36,7 +36,7 @@ from relgym.classification.examples import NOISE as UNKNOWN
 from relgym.classification.role_classifier import RoleKind
 from relgym.classification.views import View
 from relgym.clustering.mode import NOISE, Mode
-from relgym.config.constants import LEFT_OPEN, ROUGH
+from relgym.config.constants import DIGITS, LEFT_OPEN, ROUGH, ROUNDED
 from relgym.laws.frames import axis_names
 from relgym.logic.batch import matches
 from relgym.logic.clause import Clause, Literal
@@ -65,7 +65,7 @@ _CLOSE: Final = 1e-4
 """Values that differ by no more than this part of what usually changes are the same but for digits."""
 
 _EXACT: Final = 9
-"""Significant digits of numbers within conditions."""
+"""Significant digits of numbers within conditions, where rounding isn't coarser (`DIGITS`)."""
 
 DOUBT: Final = 2e-4
 """The list may differ from the votes for so large a share of the examples, if nothing explains those anyway."""
@@ -529,18 +529,22 @@ def _spelled(part: PropertyModel, classifier: BinaryClassifier, functions: dict[
     texts: dict[str, str] = {}
     plain = scope.scalars[len(scope.own) :]
     i, j = (functions[mode] for mode in scope.modes)
-    sums: list[Sum | None] = [i, j, _plus(i, j, -1.0)]
-    sums += [_plus(Sum(((1.0, name),)), f, k) for name, _, k in scope.follows for f in (i, j)]
+    rough = part.clusterer.floor / max(
+        part.clusterer.reach, part.clusterer.floor
+    )  # of the property's numbers
+    dust, digits = max(ROUNDED, rough), DIGITS if rough > ROUNDED else _EXACT
+    sums: list[Sum | None] = [i, j, _plus(i, j, -1.0, dust)]
+    sums += [_plus(Sum(((1.0, name),)), f, k, dust) for name, _, k in scope.follows for f in (i, j)]
     closed = all(part.mode(m).roles[1:] == () or not _open(part, m) for m in scope.modes)
     for name, found in zip(plain, sums, strict=False):
-        texts[name] = found.text(_EXACT) if found is not None and closed else ""
+        texts[name] = found.text(digits) if found is not None and closed else ""
     turned = plain[len(sums) :]
     names = [name for name, _ in scope.present]
     for name, (own, f) in zip(turned, ((p, f) for p in names for f in (i, j)), strict=True):
         if f.terms or not f.constant:
-            product = f"({f.text(_EXACT)}) * {own}"
+            product = f"({f.text(digits)}) * {own}"
         else:  # a multiple of one property is a sum, too
-            product = Sum(((f.constant, own),)).text(_EXACT)
+            product = Sum(((f.constant, own),)).text(digits)
         texts[name] = product if closed else ""
     return texts
 
@@ -550,12 +554,13 @@ def _open(part: PropertyModel, mode: int) -> bool:
     return any(role in part.casting.embodied(part.mode(mode)) for role in part.mode(mode).roles[1:])
 
 
-def _plus(a: Sum, b: Sum, weight: float) -> Sum:
+def _plus(a: Sum, b: Sum, weight: float, dust: float) -> Sum:
+    """A sum and a multiple of another one, without terms of which only `dust` is left, as a share of the largest."""
     total: dict[str, float] = {}
     for w, name in (*a.terms, *((weight * w, name) for w, name in b.terms)):
         total[name] = total.get(name, 0.0) + w
     most = max((abs(w) for w, _ in (*a.terms, *b.terms)), default=1.0)
-    terms = tuple((w, name) for name, w in total.items() if abs(w) > 1e-9 * most)
+    terms = tuple((w, name) for name, w in total.items() if abs(w) > dust * most)
     return Sum(terms, a.constant + weight * b.constant)
 
 

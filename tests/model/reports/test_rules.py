@@ -376,3 +376,18 @@ def test_what_is_hardly_ever_claimed_is_printed_as_no_prediction(seed: int) -> N
     doubt = model.rules().properties[0].doubt
     assert re.fullmatch(r"too few such predictions .* to claim any, but in [\d.]+ % of steps", doubt)
     assert f"no prediction: {doubt}" in model.describe()
+
+
+def test_conditions_have_no_more_digits_than_the_numbers() -> None:
+    """A brake in single precision: what weights differ by is rounding, and isn't printed."""
+    rng, schema = np.random.default_rng(0), schema_of(("x", "v"), ("u",))
+    model, x, v = WorldModel(schema), np.float32(0.0), np.float32(1.0)
+    for u in rng.uniform(-0.3, 0.3, 1_500).astype(np.float32):
+        before = {"self": (float(x), float(v)), "action": (float(u),)}
+        v = v + u if v + u > 0.0 else np.float32(0.0)
+        x = x + np.float32(0.3) * v if x < 40.0 else np.float32(-40.0)
+        step = Transition(schema.scene(before), schema.scene(before | {"self": (float(x), float(v))}))
+        compare_and_learn(model, step, model.predict_one(step.before), precision=5e-7)
+    told = str(model.rules().properties)
+    assert "action.u" in told
+    assert not re.search(r"\\d\\.\\d{8,}", model.describe())
