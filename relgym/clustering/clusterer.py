@@ -340,17 +340,10 @@ class ModeClusterer:
         if len(self.y) >= RECENT or estimate <= self.scale.sigma:
             return False
         left = self.labels[part] == NOISE
-        rng, scale = np.random.default_rng(len(self.y)), self.scale
         budget.spend(self.config.draws * x.shape[1] * FEWEST)
-        return coded_by_a_law(
-            x[left],
-            self.y[part[left]],
-            scale.sigma,
-            scale.tolerance,
-            estimate,
-            draws=self.config.draws,
-            rng=rng,
-        )
+        rng = np.random.default_rng(len(self.y))
+        y = self.y[part[left]]
+        return coded_by_a_law(x[left], y, self.scale, estimate, draws=self.config.draws, rng=rng)
 
     def _start_over(self) -> None:
         """Another noise scale: forget the modes, all examples become noise and are searched again."""

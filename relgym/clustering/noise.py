@@ -12,6 +12,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from relgym.clustering.discovery import Scale, verifying_bits
 from relgym.config.constants import (
     ENOUGH,
     MAJORITY,
@@ -175,8 +176,7 @@ def _quartile(spreads: list[tuple[float, int]]) -> float:
 def coded_by_a_law(
     x: NDArray[np.float64],
     y: NDArray[np.float64],
-    sigma: float,
-    tolerance: float,
+    scale: Scale,
     estimate: float,
     *,
     draws: int,
@@ -192,22 +192,29 @@ def coded_by_a_law(
     ----------
     x, y
         Examples that no mode explains, with columns in order of preference: shapes ``(n, d)`` and ``(n,)``.
-    sigma, tolerance
-        The noise as assumed, and the largest residual of what a function explains then, in units of y.
+    scale
+        The noise as assumed, and its tolerances.
     estimate
-        The noise as estimated.
+        The noise as estimated, in units of y.
     draws, rng
         How many samples are drawn, and what draws them.
     """
     terms = 2
     found = consensus(
-        x, y, sigma=sigma, tolerance=tolerance, terms=terms, size=terms + 1 + VERIFYING, draws=draws, rng=rng
+        x,
+        y,
+        sigma=scale.sigma,
+        tolerance=scale.tolerance,
+        terms=terms,
+        size=terms + 1 + VERIFYING,
+        draws=draws,
+        rng=rng,
     )
     if found is None:
         return False
-    value = math.log2(max(float(np.ptp(y)) / tolerance, 2.0))
     numbers = found.fit.terms * NUMBER_BITS + math.log2(math.comb(x.shape[1], len(found.fit.columns)))
-    return (len(y) - found.size) * value + numbers < len(y) * math.log2(max(estimate / sigma, 1.0))
+    bits = (len(y) - found.size) * verifying_bits(y, scale) + numbers
+    return bits < len(y) * math.log2(max(estimate / scale.sigma, 1.0))
 
 
 def refuted(sigma: float, estimate: float, *, explained: float, y: NDArray[np.float64]) -> bool:

@@ -149,7 +149,7 @@ class Population:
 
     @property
     def noise_examples(self) -> int:
-        """Number of examples no mode explains."""
+        """Number of examples no mode explains; where there are none any more, with those that they stood for."""
         if not len(self.log):
             return self.known_noise
         return int(np.count_nonzero(self.labels == NOISE)) + self.log.forgotten[NOISE]

@@ -78,21 +78,11 @@ def unified(
         return signature, LinearFit((own,), (1.0,), 0.0, 0.0)
     if min((np.abs(y[side]) > scale.tolerance).mean() for side in sides) < MAJORITY:
         return None  # on one side whatever is multiplied by nothing would do
-    most = min(config.max_terms, allowed)
     for width in stages[:1] if config.own_only else stages:
         x = slots.matrix(table.x[rows[pooled]], order[:width])
-        fits = (
-            _fitted(x, y[pooled], scale, config.max_terms if c else most, changes=c)
-            for c in ((False, True) if own in order else (False,))
-        )
-        fit = next(
-            (
-                f
-                for f in fits
-                if f.terms < allowed and np.abs(y[pooled] - f.predict(x)).max() <= scale.tolerance
-            ),
-            None,
-        )
+        fit = _fitted(x, y[pooled], scale, config, allowed)
+        if fit is None and own in order:
+            fit = _fitted(x, y[pooled], scale, config, allowed, changes=True)
         if fit is None:
             continue
         both = np.concatenate(everyone)
@@ -107,15 +97,26 @@ def unified(
 
 
 def _fitted(
-    x: NDArray[np.float64], y: NDArray[np.float64], scale: Scale, most: int, *, changes: bool
-) -> LinearFit:
-    """A function of responses, or of how they differ from the first column, the property's present value.
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    scale: Scale,
+    config: ClusteringConfig,
+    allowed: int,
+    *,
+    changes: bool = False,
+) -> LinearFit | None:
+    """A function of fewer than the allowed terms that explains all responses, or None.
 
-    What little a large number changes by is lost where all of it is fitted: an odometer's way since the last step.
+    Of `changes`: one of how they differ from the first column, the property's present value. What little a large number
+    changes by is lost where all of it is fitted: an odometer's way since the last step. It may be the difference of two
+    columns that are nearly alike, which is found only with others that are needless then.
     """
-    if not changes:
-        return forward_stepwise(x, y, sigma=scale.sigma, max_terms=most)
-    return with_unit(forward_stepwise(x[:, 1:], y - x[:, 0], sigma=scale.sigma, max_terms=most - 1), 0)
+    if changes:
+        fit = forward_stepwise(x[:, 1:], y - x[:, 0], sigma=scale.sigma, max_terms=config.max_terms - 1)
+        fit = with_unit(fit, 0)
+    else:
+        fit = forward_stepwise(x, y, sigma=scale.sigma, max_terms=min(config.max_terms, allowed))
+    return fit if fit.terms < allowed and np.abs(y - fit.predict(x)).max() <= scale.tolerance else None
 
 
 def _persist(

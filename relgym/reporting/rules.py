@@ -457,7 +457,9 @@ class RuleList:
                 "Branches are tried in order; steps: training steps that go by it; ±: what it leaves there."
             )
         if any(_often_wrong(branch) for p in self.properties for branch in p.branches):
-            lines.append("right: of so many of these steps; where nothing stands, of nearly all.")
+            lines.append(
+                "right: for so many of them what is said holds, if not for nearly all; ± is of these."
+            )
         return "\n".join(f"# {line}" for line in lines)
 
 

@@ -35,6 +35,12 @@ def evaluated(x: np.ndarray, y: np.ndarray, fit: LinearFit, support: int = 3) ->
     return identified(x, y, fit, scale=SCALE, support=support)
 
 
+def told(x: np.ndarray, y: np.ndarray, scale: Scale, rng: np.random.Generator) -> Consensus | None:
+    """What is found where all rows are news, and the first column is the property's present value."""
+    states, n, columns = np.zeros(len(y), dtype=int), len(y), x.shape[1]
+    return find_mode(x, y, states, stages=(columns,), fresh=n, scale=scale, config=CONFIG, rng=rng, present=0)
+
+
 def test_a_weight_that_one_example_determines_is_dropped(rng: np.random.Generator) -> None:
     # A ball that meets the slope along the floor has w = 0 but for once: that once would fix w's weight.
     x = np.column_stack([rng.normal(size=30), np.zeros(30)])
@@ -163,17 +169,7 @@ def test_that_nothing_changes_is_said_in_fewer_bits_than_another_flag(
     y = x[:, 0].copy()
     changed = np.flatnonzero(y == 1.0)[:exceptions]
     x[changed, 0] = 0.0
-    found = find_mode(
-        x,
-        y,
-        np.zeros(60, dtype=int),
-        stages=(2,),
-        fresh=60,
-        scale=Scale(1e-12, 4.0, 6.0),
-        config=CONFIG,
-        rng=rng,
-        present=0,
-    )
+    found = told(x, y, Scale(1e-12, 4.0, 6.0), rng)
     assert found is not None
     assert found.fit.columns == (column,)
     assert found.fit.weights == pytest.approx((1.0,))
@@ -184,17 +180,7 @@ def test_what_drifts_within_the_noise_is_not_said_to_stay(rng: np.random.Generat
     # Each row may be one of something that stays; all of them together aren't.
     x = rng.normal(size=(300, 1))
     y = x[:, 0] + 0.02 + rng.normal(scale=0.01, size=300)
-    found = find_mode(
-        x,
-        y,
-        np.zeros(300, dtype=int),
-        stages=(1,),
-        fresh=300,
-        scale=Scale(0.01, 4.0, 6.0),
-        config=CONFIG,
-        rng=rng,
-        present=0,
-    )
+    found = told(x, y, Scale(0.01, 4.0, 6.0), rng)
     assert found is not None
     assert found.fit.intercept == pytest.approx(0.02, abs=2e-3)
 
@@ -346,17 +332,7 @@ def test_bits_that_an_example_verifies_by() -> None:
 
 def test_a_clock_takes_steps_and_isnt_stretched(rng: np.random.Generator) -> None:
     x = 1.7e9 + np.sort(rng.uniform(0.0, 1e3, 60))[:, None]
-    found = find_mode(
-        x,
-        x[:, 0] + 0.25,
-        np.zeros(60, dtype=int),
-        stages=(1,),
-        fresh=60,
-        scale=Scale(1e-5, 4.0, 6.0),
-        config=CONFIG,
-        rng=rng,
-        present=0,
-    )
+    found = told(x, x[:, 0] + 0.25, Scale(1e-5, 4.0, 6.0), rng)
     assert found is not None
     assert (found.fit.columns, found.fit.weights) == ((0,), (1.0,))
     assert found.fit.intercept == pytest.approx(0.25, abs=1e-6)

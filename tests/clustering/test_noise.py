@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from relgym.clustering.discovery import Scale
 from relgym.clustering.noise import (
     _quartile,
     _windows,
@@ -162,7 +163,7 @@ def test_functions_that_hold_by_turns_are_no_noise(kinds: int, seed: int) -> Non
     rng = np.random.default_rng(seed)
     x, which = rng.normal(size=(80, 3)), rng.integers(kinds, size=80)
     y = (1.0 + which) * x[:, 0] + 0.25 * which
-    assert coded_by_a_law(x, y, 1e-14, 4e-14, float(y.std()) / 2, draws=1_500, rng=rng)
+    assert coded_by_a_law(x, y, Scale(1e-14, 4.0, 6.0), float(y.std()) / 2, draws=1_500, rng=rng)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -170,4 +171,4 @@ def test_noise_is_no_law(seed: int) -> None:
     rng = np.random.default_rng(seed)
     x = rng.normal(size=(80, 3))
     y = 2.0 * x[:, 0] + 0.1 * rng.normal(size=80)
-    assert not coded_by_a_law(x, y, 1e-14, 4e-14, 0.1, draws=1_500, rng=rng)
+    assert not coded_by_a_law(x, y, Scale(1e-14, 4.0, 6.0), 0.1, draws=1_500, rng=rng)

@@ -115,7 +115,7 @@ total.x'  (2,000 steps)
   else:                  x' = x + 1  1,043 steps, 215 right  ± 0
 
 # Branches are tried in order; steps: training steps that go by it; ±: what it leaves there.
-# right: of so many of these steps; where nothing stands, of nearly all."""
+# right: for so many of them what is said holds, if not for nearly all; ± is of these."""
     )
     read = parse_rules(str(rules))
     assert [branch.wrong for branch in read.properties[0].branches] == [0, 828]

@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,24 @@ class _Found:
     inert: bool
     difference: bool
     lead: tuple[str, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Criterion:
+    """What a law with next values must be better than.
+
+    Attributes
+    ----------
+    share, size
+        Share of the rows that modes explain, and parameters of the largest one.
+    config, seed
+        As in the configuration.
+    """
+
+    share: float
+    size: float
+    config: ClusteringConfig
+    seed: int
 
 
 def due(parts: Parts, type_name: str) -> list[Look]:
@@ -142,9 +160,8 @@ def _search(parts: Parts, target: Target, look: Look) -> Inquiry | None:
     order = _columns(slots, replace(target, given=free))
     x, y = slots.matrix(table.x[clusterer.rows[recent]], order), clusterer.y[recent]
     scales = tuple(dict.fromkeys((replace(clusterer.scale, sigma=clusterer.floor), clusterer.scale)))
-    config, seed = parts.config.clustering, parts.config.seed
-    settings: dict[str, Any] = {"share": share, "size": size, "config": config, "seed": seed}
-    task = Task(_sought, x, y, slots, order, scales, inert=look[2], **settings)
+    criterion = _Criterion(share, size, parts.config.clustering, parts.config.seed)
+    task = Task(_sought, x, y, slots, order, scales, criterion, inert=look[2])
     return Inquiry(look, target, task)
 
 
@@ -155,15 +172,15 @@ def _sought(
     slots: SlotSignature,
     order: NDArray[np.intp],
     scales: tuple[Scale, ...],
+    criterion: _Criterion,
     *,
     inert: bool,
-    **settings: Any,
 ) -> Steps[_Found | None]:
     """What is looked for; where only laws of change count and another one is better, a law without what that one reads.
 
     Of a place, a sensor that shows it says more than its own speed does, until the sensor fails.
     """
-    while (found := (yield from _better.steps(x, y, slots, order, scales, **settings))) is not None:
+    while (found := (yield from _better.steps(x, y, slots, order, scales, criterion))) is not None:
         if found.inert >= inert:
             return found
         names = {(name, f"{prop}{PRIME}") for name, prop in found.given}
@@ -180,11 +197,7 @@ def _better(
     slots: SlotSignature,
     order: NDArray[np.intp],
     scales: tuple[Scale, ...],
-    *,
-    share: float,
-    size: float,
-    config: ClusteringConfig,
-    seed: int,
+    criterion: _Criterion,
 ) -> Steps[_Found | None]:
     """The law with next values that explains more of some rows than modes do, or as many more briefly.
 
@@ -198,14 +211,13 @@ def _better(
         Signature of the rows, and what columns they have of it.
     scales
         That of rounding alone, and that which is assumed, if it is another one.
-    share, size
-        Share of the rows that modes explain, and parameters of the largest one.
-    config, seed
-        As in the configuration.
+    criterion
+        What it must be better than.
     """
+    config = criterion.config
     lengths = sorted({min(2, config.max_terms), config.max_terms})
     for scale, terms in itertools.product(scales, lengths):
-        rng = np.random.default_rng([seed, len(y)])
+        rng = np.random.default_rng([criterion.seed, len(y)])
         found = yield from consensus.steps(
             x,
             y,
@@ -221,8 +233,8 @@ def _better(
             found = yield from identified.steps(x, y, found.fit, scale=scale, support=config.support)
         if found is None or 2 * found.size < len(y) or not is_law(x, y, found, x.shape[1], scale):
             continue
-        gain, little = found.size / len(y) - share, 1.0 - NEARLY_ALL
-        if gain <= little and (gain <= -little or found.fit.terms >= size):
+        gain, little = found.size / len(y) - criterion.share, 1.0 - NEARLY_ALL
+        if gain <= little and (gain <= -little or found.fit.terms >= criterion.size):
             continue
         yield law_cells(found, x.shape[1])
         law = _read(slots, order, found.fit)
